@@ -1,0 +1,235 @@
+"""Component: the base class of every model, light until its equations are asked for.
+
+An instance that a user builds holds only the modifiers it was given: `PmsgTurbine(aggregate=10)` costs nothing, so a
+farm of ten thousand is cheap. Reading a parameter gives its number. `elaborate()` makes the symbolic twin, in which
+the same attributes are CasADi symbols, and collects the equations.
+"""
+
+from __future__ import annotations
+
+import difflib
+import linecache
+import os
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from gustform.language.connector import Connector
+from gustform.language.declare import Declaration, Discrete, Parameter, Part, Table, Variable
+from gustform.language.errors import GustformError
+from gustform.language.table import TableData
+
+if TYPE_CHECKING:
+    from gustform.language.scope import Scope
+
+AnyDeclaration = Declaration | Part | Connector
+
+
+def suggest(name: str, known: list[str]) -> str:
+    """One thing to try for a name that is not known: the nearest one, or the list."""
+    near = difflib.get_close_matches(name, known, n=1)
+    return near[0] if near else ("one of " + ", ".join(known) if known else "nothing: it takes none")
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where an equation was written: file, line and the text of that line."""
+
+    file: str
+    line: int
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.text} ({os.path.basename(self.file)}:{self.line})"
+
+
+def _caller() -> Source:
+    frame = sys._getframe(2)
+    file, line = frame.f_code.co_filename, frame.f_lineno
+    text = linecache.getline(file, line).strip()
+    start, end = text.find("(") + 1, text.rfind(")")
+    return Source(file, line, text[start:end] if 0 < start < end else text)
+
+
+class Component:
+    """Base of all components. Subclasses declare attributes and write `equations()`."""
+
+    _declarations: ClassVar[dict[str, AnyDeclaration]] = {}
+    _scope: Scope | None = None
+    _parent: Component | None = None
+    _path: str = ""
+
+    def __init_subclass__(cls) -> None:
+        members = {name: value for base in reversed(cls.__mro__) for name, value in vars(base).items()}
+        cls._declarations = {
+            name: value for name, value in members.items() if isinstance(value, Declaration | Part | Connector)
+        }
+
+    def __init__(self, **modifiers: Any) -> None:
+        declarations = self._declarations
+        for name, value in modifiers.items():
+            declaration = declarations.get(name)
+            if not isinstance(declaration, Parameter | Part | Table | Variable | Discrete):
+                raise GustformError(
+                    "GF1004",
+                    f"{type(self).__name__} has no parameter {name!r}",
+                    hint=suggest(name, self.parameter_names()),
+                )
+            if isinstance(declaration, Part):
+                self._check_part(declaration, value)
+            elif isinstance(declaration, Table):
+                if not isinstance(value, TableData):
+                    raise GustformError("GF2001", f"{name} must be a table; got {value!r}", hint="TableData(...)")
+            elif isinstance(declaration, Parameter) and not callable(value):
+                modifiers[name] = declaration.check(value, f"{type(self).__name__}.{name}")
+        self._modifiers: dict[str, Any] = modifiers
+        self._parts: dict[str, Component] = {}
+
+    def _check_part(self, part: Part, value: Any) -> None:
+        if isinstance(value, Mapping):
+            return
+        base = part.base or part.kind
+        if not isinstance(value, base):
+            raise GustformError(
+                "GF1007",
+                f"{type(self).__name__}.{part.name} must be a {base.__name__}; got {type(value).__name__}",
+                hint=f"a component derived from {base.__name__}",
+            )
+
+    # ---- declarations -------------------------------------------------------------------------------------------
+    @classmethod
+    def declarations(cls) -> dict[str, AnyDeclaration]:
+        """All declarations by name, those of base classes first."""
+        return cls._declarations
+
+    @classmethod
+    def declared(cls, kind: type[Any]) -> dict[str, Any]:
+        """The declarations of one kind, e.g. `declared(Parameter)`."""
+        return {name: value for name, value in cls._declarations.items() if isinstance(value, kind)}
+
+    @classmethod
+    def parameter_names(cls) -> list[str]:
+        """What may be given to the constructor: parameters, tables and parts."""
+        return [name for name, value in cls._declarations.items() if isinstance(value, Parameter | Part | Table)]
+
+    # ---- numbers ------------------------------------------------------------------------------------------------
+    @property
+    def path(self) -> str:
+        """Dotted name inside the unit ("" for the unit itself)."""
+        return self._path
+
+    def part(self, name: str) -> Component:
+        """The sub-component of that name, built on first use from its modifiers."""
+        if name not in self._parts:
+            declaration = self._declarations[name]
+            assert isinstance(declaration, Part)
+            given = self._modifiers.get(name, {})
+            if isinstance(given, Component):
+                child = type(given)(**given._modifiers)
+            else:
+                child = declaration.kind(**given)
+            usable = type(child).declarations()
+            for key, value in declaration.modifiers.items():
+                if key in usable:
+                    child._modifiers.setdefault(key, value)
+            child._parent = self
+            child._path = f"{self._path}.{name}" if self._path else name
+            self._parts[name] = child
+        return self._parts[name]
+
+    def _get(self, declaration: AnyDeclaration) -> Any:
+        if self._scope is not None:
+            return self._scope.symbol(declaration)
+        if isinstance(declaration, Part):
+            return self.part(declaration.name)
+        if isinstance(declaration, Parameter):
+            return self.value(declaration.name)
+        if isinstance(declaration, Table):
+            return self.table(declaration.name)
+        raise GustformError(
+            "GF1008",
+            f"{type(self).__name__}.{declaration.name} has a value only in a running model",
+            hint="reading it inside equations()",
+        )
+
+    def value(self, name: str) -> Any:
+        """The number of a parameter: given, bound by the parent, or the default. GF2004 if there is none."""
+        declaration = self._declarations[name]
+        assert isinstance(declaration, Parameter)
+        label = f"{self._path}.{name}" if self._path else name
+        given = self._modifiers.get(name, declaration.start if declaration.free else declaration.default)
+        if callable(given):
+            owner = self._parent if self.is_bound(name) else self
+            given = given(owner)
+        if given is None:
+            raise GustformError(
+                "GF2004",
+                f"{type(self).__name__}.{label} is not given ({declaration.description}, {declaration.unit})",
+                hint=f"{name}: a number in {declaration.unit}",
+            )
+        return declaration.check(given, label)
+
+    def is_bound(self, name: str) -> bool:
+        """Whether the parent sets this parameter by a function of its own parameters."""
+        return callable(self._modifiers.get(name)) and self._parent is not None
+
+    def table(self, name: str) -> TableData:
+        """The data of a table; GF2004 if there is none."""
+        given = self._modifiers.get(name)
+        if callable(given) and self._parent is not None:
+            given = given(self._parent)
+        if not isinstance(given, TableData):
+            raise GustformError("GF2004", f"{type(self).__name__}.{name} needs a table", hint="a table file")
+        return given
+
+    def number(self, value: float | Callable[[Any], Any]) -> float:
+        """A start, nominal or default as a number."""
+        return float(value(self)) if callable(value) else float(value)
+
+    def structure_key(self) -> tuple[Any, ...]:
+        """Equal keys mean equal equations: class, structural values, bound parameters, and those of the parts."""
+        key: list[Any] = [type(self)]
+        for name, declaration in self._declarations.items():
+            if isinstance(declaration, Parameter):
+                if declaration.structural:
+                    key.append((name, self.value(name)))
+                elif self.is_bound(name):
+                    key.append((name, self._modifiers[name]))
+            elif isinstance(declaration, Part):
+                key.append((name, self.part(name).structure_key()))
+        return tuple(key)
+
+    # ---- equations ----------------------------------------------------------------------------------------------
+    def equations(self) -> None:
+        """Written by subclasses: `self.eq(...)`, `self.connect(...)`, `self.initial(...)`, `self.when(...)`."""
+
+    def _need_scope(self) -> Scope:
+        if self._scope is None:
+            raise GustformError("GF1009", "equations can only be stated while a model is elaborated")
+        return self._scope
+
+    def eq(self, lhs: Any, rhs: Any) -> None:
+        """lhs = rhs. Both sides must have the same unit."""
+        self._need_scope().add_equation(lhs, rhs, _caller())
+
+    def initial(self, lhs: Any, rhs: Any) -> None:
+        """lhs = rhs at a steady-state start; one for each free parameter."""
+        self._need_scope().add_initial(lhs, rhs, _caller())
+
+    def connect(self, a: Any, b: Any) -> None:
+        """Connect two ports of the same connector type, or two signals."""
+        self._need_scope().add_connection(a, b, _caller())
+
+    def der(self, variable: Any) -> Any:
+        """Time derivative of a declared variable."""
+        return self._need_scope().derivative(variable, _caller())
+
+    def when(self, condition: Any, assign: dict[Any, Any] | None = None, *, reinit: dict[Any, Any] | None = None) -> None:
+        """When `condition` (a comparison, or several joined by logic_and/logic_or) becomes true: set discrete
+        values (`assign`) and states (`reinit`). The right-hand sides see the values before the event."""
+        self._need_scope().add_when(condition, assign or {}, reinit or {}, _caller())
+
+    def sampled(self, period: Any, assign: dict[Any, Any], *, reinit: dict[Any, Any] | None = None) -> None:
+        """Every `period` (a parameter in s): set discrete values; the block of a sampled controller."""
+        self._need_scope().add_sampled(period, assign, reinit or {}, _caller())
