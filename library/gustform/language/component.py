@@ -44,12 +44,23 @@ class Source:
         return f"{self.text} ({os.path.basename(self.file)}:{self.line})"
 
 
+def _equation_text(call: str) -> str:
+    """"C * der(v) = i" from the arguments of "self.eq(self.C * self.der(self.v), self.i)"."""
+    depth = 0
+    for position, character in enumerate(call):
+        depth += (character in "([{") - (character in ")]}")
+        if character == "," and depth == 0:
+            call = call[:position] + " =" + call[position + 1 :]
+            break
+    return call.replace("self.", "").replace("ca.", "")
+
+
 def _caller() -> Source:
     frame = sys._getframe(2)
     file, line = frame.f_code.co_filename, frame.f_lineno
     text = linecache.getline(file, line).strip()
     start, end = text.find("(") + 1, text.rfind(")")
-    return Source(file, line, text[start:end] if 0 < start < end else text)
+    return Source(file, line, _equation_text(text[start:end] if 0 < start < end else text))
 
 
 class Component:
@@ -171,7 +182,7 @@ class Component:
         return declaration.check(given, label)
 
     def is_bound(self, name: str) -> bool:
-        """Whether the parent sets this parameter by a function of its own parameters."""
+        """Whether the parent sets this parameter by a function of its own parameters (and nobody overrode it)."""
         return callable(self._modifiers.get(name)) and self._parent is not None
 
     def table(self, name: str) -> TableData:
@@ -183,19 +194,46 @@ class Component:
             raise GustformError("GF2004", f"{type(self).__name__}.{name} needs a table", hint="a table file")
         return given
 
+    def parameter_values(self) -> dict[str, float]:
+        """Every non-structural parameter of the tree by path. Free ones have their start value."""
+        values: dict[str, float] = {}
+        for name, declaration in self._declarations.items():
+            if isinstance(declaration, Parameter) and not declaration.structural:
+                values[f"{self._path}.{name}" if self._path else name] = float(self.value(name))
+            elif isinstance(declaration, Part):
+                values.update(self.part(name).parameter_values())
+        return values
+
+    def at(self, path: str) -> Component:
+        """The component of a dotted path of parts ("" is this one)."""
+        component: Component = self
+        for name in path.split(".") if path else ():
+            component = component.part(name)
+        return component
+
+    def with_value(self, path: str, value: float) -> Component:
+        """A copy in which the parameter `path` has another value; what is computed from it follows."""
+        head, _, rest = path.partition(".")
+        modifiers = dict(self._modifiers)
+        if not rest:
+            modifiers[head] = value
+        else:
+            given = modifiers.get(head, {})
+            child = given if isinstance(given, Component) else self._declarations[head].kind(**given)  # type: ignore[union-attr]
+            modifiers[head] = child.with_value(rest, value)
+        return type(self)(**modifiers)
+
     def number(self, value: float | Callable[[Any], Any]) -> float:
         """A start, nominal or default as a number."""
         return float(value(self)) if callable(value) else float(value)
 
     def structure_key(self) -> tuple[Any, ...]:
-        """Equal keys mean equal equations: class, structural values, bound parameters, and those of the parts."""
+        """Equal keys mean equal equations: class, structural values, and those of the parts."""
         key: list[Any] = [type(self)]
         for name, declaration in self._declarations.items():
             if isinstance(declaration, Parameter):
                 if declaration.structural:
                     key.append((name, self.value(name)))
-                elif self.is_bound(name):
-                    key.append((name, self._modifiers[name]))
             elif isinstance(declaration, Part):
                 key.append((name, self.part(name).structure_key()))
         return tuple(key)

@@ -118,20 +118,13 @@ class Scope:
         )
         return symbol
 
-    def declare(self, parent: Component | None) -> None:
-        """Make the symbols of every declaration except parts. Bound parameters become the parent's expression."""
+    def declare(self) -> None:
+        """Make the symbols of every declaration except parts."""
         for name, declaration in self.component.declarations().items():
             label = self._label(name)
             if isinstance(declaration, Parameter):
                 if declaration.structural:
                     self._items[name] = self.component.value(name)
-                elif self.component.is_bound(name):
-                    bound = ca.SX(self.component._modifiers[name](parent))
-                    symbol = self._new(declaration, label, "bound")
-                    self._items[name] = symbol
-                    self.elaborated.equations.append(
-                        Equation(symbol, bound, label, Source("", 0, f"{label} = (bound by its parent)"))
-                    )
                 else:
                     self._items[name] = self._new(declaration, label, "parameter")
             elif isinstance(declaration, Table):
@@ -249,19 +242,19 @@ def elaborate(component: Component) -> Elaborated:
     elaborated = Elaborated(component)
     views: list[Component] = []
 
-    def view_of(numeric: Component, parent: Component | None) -> Component:
+    def view_of(numeric: Component) -> Component:
         view = object.__new__(type(numeric))
         view._modifiers, view._parts, view._path = numeric._modifiers, {}, numeric.path
         scope = Scope(elaborated, numeric)
         view._scope = scope
-        scope.declare(parent)
+        scope.declare()
         for name, declaration in numeric.declarations().items():
             if isinstance(declaration, Part):
-                scope.add_part(name, view_of(numeric.part(name), view))
+                scope.add_part(name, view_of(numeric.part(name)))
         views.append(view)
         return view
 
-    view_of(component, None)
+    view_of(component)
     for view in views:
         view.equations()
     return elaborated

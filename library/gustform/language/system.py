@@ -149,6 +149,6 @@ class System:
                 "GF2008", f"{path}: no parameter {parameter!r}", hint=suggest(parameter, list(parameters))
             )
         declaration = parameters[parameter]
-        if declaration.structural or component.is_bound(parameter):
+        if declaration.structural:
             raise GustformError("GF2008", f"{path} cannot change while the model runs")
         self.schedule.append(Change(float(at), path, declaration.check(value, path)))

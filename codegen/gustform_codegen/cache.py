@@ -1,0 +1,54 @@
+"""Kernels by content: the same C text with the same compiler and flags is compiled once per machine."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+
+from gustform_codegen import toolchain
+
+
+def default_folder() -> Path:
+    """$GUSTFORM_CACHE, else $XDG_CACHE_HOME/gustform, else ~/.cache/gustform."""
+    if chosen := os.environ.get("GUSTFORM_CACHE"):
+        return Path(chosen)
+    base = os.environ.get("XDG_CACHE_HOME")
+    return (Path(base) if base else Path.home() / ".cache") / "gustform"
+
+
+@lru_cache(maxsize=1)
+def _machine() -> str:
+    """What -march=native depends on."""
+    try:
+        for line in Path("/proc/cpuinfo").read_text(encoding="ascii", errors="replace").splitlines():
+            if line.startswith("flags"):
+                return line
+    except OSError:
+        pass
+    return platform.machine() + platform.processor()
+
+
+@dataclass
+class KernelCache:
+    """Compiled kernels in a folder. `compilations` counts the C compilations this object needed."""
+
+    include: Path
+    folder: Path = field(default_factory=default_folder)
+    compilations: int = 0
+
+    def key(self, source: str) -> str:
+        header = (self.include / "gustform" / "gust_kernel.h").read_text(encoding="utf-8")
+        parts = [source, header, toolchain.find_compiler().version, " ".join(toolchain.FLAGS), _machine()]
+        return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
+
+    def get(self, source: str, type_name: str) -> Path:
+        """The shared library for a kernel's C text, compiled if it is not there yet."""
+        path = self.folder / "kernels" / f"{self.key(source)}.so"
+        if not path.exists():
+            toolchain.compile_kernel(source, path, self.include, type_name)
+            self.compilations += 1
+        return path

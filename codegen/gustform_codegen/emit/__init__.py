@@ -1,0 +1,1 @@
+"""Printers of C: one module for each kind of output."""

@@ -1,0 +1,640 @@
+"""Flatten one unit type: from declared equations to the few rows that the solver has to see.
+
+Order of work: connections become equations; aliases leave; the rest is matched, sorted into blocks and solved
+symbolically where that is exact (explicit assignments, small linear blocks); what remains are states with an
+explicit derivative, torn iteration variables, and the flows at the connectors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+from gustform.language.component import Component
+from gustform.language.connector import Potential
+from gustform.language.errors import GustformError, Place
+from gustform.language.operators import constants, table_calls
+from gustform.language.scope import Elaborated, Equation, Symbol, elaborate
+from gustform.language.unitcheck import check_units
+
+from gustform_codegen.alias import AliasSets, as_alias
+from gustform_codegen.events import bend_roots, indicator, refuse_bare_comparisons
+from gustform_codegen.structure import (
+    Matching,
+    blocks,
+    match,
+    overdetermined_part,
+    tear,
+    underdetermined_part,
+)
+from gustform_codegen.unit_type import (
+    BoundaryFlow,
+    Call,
+    External,
+    Recorded,
+    Root,
+    Row,
+    UnitType,
+    Unknown,
+    WhenClause,
+)
+
+# Linear blocks up to this many unknowns are solved by symbolic elimination; larger ones are left to the solver.
+_MAX_LINEAR_BLOCK = 3
+
+
+@dataclass(frozen=True)
+class _Statement:
+    """One equation of the flat system: expression = 0. `call` is set for value = table(x, y)."""
+
+    expression: Any
+    text: str
+    place: Place | None
+    call: Any = None
+
+
+def _hash(symbol: Any) -> int:
+    return int(symbol.element_hash())
+
+
+def _symbols(expression: Any) -> list[int]:
+    return [_hash(s) for s in ca.symvar(expression)]
+
+
+class _Substitution:
+    """Symbols and what they are replaced by, applied in one pass."""
+
+    def __init__(self) -> None:
+        self.symbols: list[Any] = []
+        self.values: list[Any] = []
+        self.known: set[int] = set()
+
+    def add(self, symbol: Any, value: Any) -> None:
+        self.symbols.append(symbol)
+        self.values.append(value)
+        self.known.add(_hash(symbol))
+
+    def apply(self, expressions: list[Any]) -> list[Any]:
+        if not self.symbols or not expressions:
+            return expressions
+        used = {key for e in expressions for key in _symbols(e)} & self.known
+        if not used:
+            return expressions
+        chosen = [k for k, s in enumerate(self.symbols) if _hash(s) in used]
+        return list(
+            ca.substitute(expressions, [self.symbols[k] for k in chosen], [self.values[k] for k in chosen])
+        )
+
+    def one(self, expression: Any) -> Any:
+        return self.apply([expression])[0]
+
+
+class _Flattener:
+    def __init__(self, component: Component, signals: frozenset[str], keep: frozenset[str]) -> None:
+        self.component = component
+        self.signals = signals
+        self.keep = keep
+        self.name = type(component).__name__
+        self.e: Elaborated = elaborate(component)
+        check_units(self.e)
+        self.boundary = {path for path in self.e.ports if "." not in path}
+        self.table_index = {(id(t.declaration), t.owner.path): k for k, t in enumerate(self.e.tables)}
+        self.constants = _Substitution()
+        for constant in constants.values():
+            self.constants.add(constant.symbol, ca.SX(constant.value))
+
+    # ---- who is known, who is not ---------------------------------------------------------------------------------
+    def is_external(self, s: Symbol) -> bool:
+        if s.kind == "potential":
+            return s.path.rpartition(".")[0] in self.boundary
+        return s.kind == "input" and "." not in s.path and s.path in self.signals
+
+    def is_input(self, s: Symbol) -> bool:
+        return s.kind == "input" and "." not in s.path and s.path not in self.signals
+
+    def is_unknown(self, s: Symbol) -> bool:
+        if s.kind in ("parameter", "discrete"):
+            return False
+        return not self.is_external(s) and not self.is_input(s)
+
+    # ---- connections ------------------------------------------------------------------------------------------------
+    def connection_statements(self) -> list[_Statement]:
+        parent: dict[tuple[str, bool], tuple[str, bool]] = {}
+
+        def find(key: tuple[str, bool]) -> tuple[str, bool]:
+            while parent.setdefault(key, key) != key:
+                key = parent[key]
+            return key
+
+        for a, b, path, _source in self.e.connections:
+            keys = []
+            for port in (a, b):
+                owner = port.path.rpartition(".")[0]
+                keys.append((port.path, owner != path))  # (port, seen from outside its component)
+            parent[find(keys[0])] = find(keys[1])
+        members: dict[tuple[str, bool], list[tuple[str, bool]]] = {}
+        for key in list(parent):
+            members.setdefault(find(key), []).append(key)
+        statements: list[_Statement] = []
+        for group in members.values():
+            ports = [self.e.ports[path] for path, _ in group]
+            text = "connection of " + ", ".join(path for path, _ in group)
+            connector = ports[0].connector
+            for name in connector._potentials:
+                statements += [
+                    _Statement(port.symbols[name] - ports[0].symbols[name], text, None) for port in ports[1:]
+                ]
+            for name in connector._flows:
+                terms = [port.symbols[name] if side else -port.symbols[name] for port, (_, side) in
+                         zip(ports, group, strict=True)]
+                statements.append(_Statement(sum(terms[1:], terms[0]), text, None))
+        connected = {key for key in parent}
+        for path, port in self.e.ports.items():
+            if path in self.boundary or (path, True) in connected:
+                continue
+            if not port.connector.optional:
+                raise GustformError(
+                    "GF3003",
+                    f"{self.name}: port {path} ({port.connector.description}) is not connected",
+                    hint=f"self.connect(self.{path}, ...) or optional=True at its declaration",
+                )
+            for name in port.connector._flows:
+                statements.append(_Statement(port.symbols[name], f"{path}.{name} = 0 (not connected)", None))
+        return statements
+
+    # ---- the phases ---------------------------------------------------------------------------------------------------
+    def run(self) -> UnitType:
+        statements = [
+            _Statement(eq.lhs - eq.rhs, str(eq), Place(eq.source.file, eq.source.line)) for eq in self.e.equations
+        ]
+        statements += self.connection_statements()
+        declared_equations = len(statements)
+        statements = [
+            _Statement(self.constants.one(s.expression), s.text, s.place) for s in statements
+        ]
+        for statement in statements:
+            refuse_bare_comparisons(statement.expression, statement.text, statement.place)
+        statements = self.eliminate_aliases(statements)
+        return self.solve(statements, declared_equations)
+
+    def eliminate_aliases(self, statements: list[_Statement]) -> list[_Statement]:
+        symbols, ders = self.e.symbols, self.e.derivatives
+
+        def rank(key: int) -> int:
+            s = symbols[key]
+            if not self.is_unknown(s):
+                return 3
+            if key in ders or s.path in self.keep:
+                return 2
+            return 1 if s.kind in ("variable", "output") else 0
+
+        sets = AliasSets(rank)
+        rest: list[_Statement] = []
+        for statement in statements:
+            pair = as_alias(statement.expression)
+            if pair is not None:
+                a, b, sign = pair
+                ka, kb = _hash(a), _hash(b)
+                mergeable = all(k in symbols and symbols[k].kind not in ("parameter", "discrete") for k in (ka, kb))
+                external_state = any(
+                    rank(x) == 3 and sets.find(y)[0] in ders for x, y in ((sets.find(ka)[0], kb), (sets.find(kb)[0], ka))
+                ) if mergeable else False
+                if mergeable and not external_state and sets.join(ka, kb, sign):
+                    continue
+            rest.append(statement)
+        self.alias: dict[int, tuple[int, int]] = {}
+        substitution = _Substitution()
+        for key, s in symbols.items():
+            target, sign = sets.find(key)
+            if target != key:
+                self.alias[key] = (target, sign)
+                substitution.add(s.symbol, sign * symbols[target].symbol)
+        for key, der in list(ders.items()):
+            if key in self.alias:
+                target, sign = self.alias[key]
+                if target not in ders:
+                    ders[target] = ca.SX.sym(f"der({symbols[target].path})")
+                substitution.add(der, sign * ders[target])
+        self.alias_substitution = substitution
+        self.states = {key for key in ders if key not in self.alias}
+        for key in self.states:
+            if not self.is_unknown(symbols[key]):
+                raise GustformError(
+                    "GF3004",
+                    f"{self.name}: the derivative of {symbols[key].path} is used, but it is given from outside",
+                    hint="a state of the unit's own, coupled to the connector by a resistance or reactance",
+                )
+        expressions = substitution.apply([s.expression for s in rest])
+        return [
+            _Statement(expression, s.text, s.place) for expression, s in zip(expressions, rest, strict=True)
+        ]
+
+    def prepared(self, expression: Any) -> Any:
+        return self.alias_substitution.one(self.constants.one(expression))
+
+    def solve(self, statements: list[_Statement], declared_equations: int) -> UnitType:
+        symbols, ders = self.e.symbols, self.e.derivatives
+        # Table values are unknowns that their own statement defines.
+        calls_used: dict[int, Any] = {}
+        pending = [s.expression for s in statements] + [
+            self.prepared(x) for x in self._when_expressions()
+        ]
+        while pending:
+            for key in _symbols(pending.pop()):
+                if key in table_calls and key not in calls_used:
+                    call = table_calls[key]
+                    calls_used[key] = (call, self.prepared(call.x), self.prepared(call.y))
+                    pending += calls_used[key][1:]
+        statements = statements + [
+            _Statement(call.symbol - (x + y), f"table {call.table.name}", None, (call, x, y))
+            for call, x, y in calls_used.values()
+        ]
+        # Unknowns: algebraic variables and table values by their symbol, states by their derivative.
+        unknown_symbols: list[Any] = []
+        labels: list[str] = []
+        for key, s in symbols.items():
+            if key in self.alias or not self.is_unknown(s):
+                continue
+            unknown_symbols.append(ders[key] if key in self.states else s.symbol)
+            labels.append(f"der({s.path})" if key in self.states else s.path)
+        for call, _, _ in calls_used.values():
+            unknown_symbols.append(call.symbol)
+            labels.append(f"table value {call.symbol}")
+        index = {_hash(s): k for k, s in enumerate(unknown_symbols)}
+        n_own = len(unknown_symbols)
+        externals = [
+            (key, s) for key, s in symbols.items() if self.is_external(s)
+        ]
+        external_index = {key: n_own + k for k, (key, _) in enumerate(externals)}
+
+        incidence: list[frozenset[int]] = []
+        with_external: list[frozenset[int]] = []
+        for statement in statements:
+            used = _symbols(statement.expression)
+            if statement.call is not None:
+                used = [_hash(statement.call[0].symbol), *_symbols(statement.call[1]), *_symbols(statement.call[2])]
+            incidence.append(frozenset(index[k] for k in used if k in index))
+            with_external.append(incidence[-1] | {external_index[k] for k in used if k in external_index})
+        self.check_balance(statements, labels, incidence, n_own)
+        matching = match(incidence, n_own)
+        iterate: set[int] = set()
+        left_over: list[int] = []
+        if matching.free_equations:
+            full = match(with_external, n_own + len(externals), matching)
+            if full.free_equations:
+                self.report_singular(statements, labels, incidence, matching)
+            # An equation that fixes a connector potential: the unit's own unknown left over (a flow) is iterated on.
+            left_over = [e for e, z in enumerate(full.unknown_of) if z >= n_own]
+            iterate = {z for z in range(n_own) if full.equation_of[z] < 0}
+            matching = full
+        keep = {k for k, label in enumerate(labels) if label in self.keep}
+
+        solution = _Substitution()
+        rows: list[Row] = []
+        torn: list[int] = sorted(iterate)
+        calls: list[Call] = []
+        inner = [frozenset(z for z in row if z not in iterate) for row in incidence]
+        trimmed = Matching(
+            [z if z < n_own and e not in set(left_over) else -1 for e, z in enumerate(matching.unknown_of)],
+            matching.equation_of[:n_own],
+        )
+        explicit_ders: dict[int, Any] = {}
+        for block in blocks(inner, trimmed):
+            unknowns = [trimmed.unknown_of[e] for e in block]
+            torn += self.solve_block(
+                [statements[e] for e in block],
+                [inner[e] for e in block],
+                unknowns,
+                unknown_symbols,
+                solution,
+                rows,
+                calls,
+                keep,
+            )
+        for e in left_over:
+            rows.append(Row(solution.one(statements[e].expression), statements[e].text))
+        return self.collect(
+            rows, torn, unknown_symbols, solution, calls, explicit_ders, externals, declared_equations, statements
+        )
+
+    def solve_block(
+        self,
+        statements: list[_Statement],
+        incidence: list[frozenset[int]],
+        unknowns: list[int],
+        symbols: list[Any],
+        solution: _Substitution,
+        rows: list[Row],
+        calls: list[Call],
+        keep: set[int],
+    ) -> list[int]:
+        """Solve one block as far as symbols reach; append to `solution`, `rows`, `calls`; return what stays unknown."""
+        wanted = frozenset(unknowns)
+        local: list[Any] = []
+        solvable: list[frozenset[int]] = []
+        for statement, used in zip(statements, incidence, strict=True):
+            if statement.call is not None:
+                call, x, y = statement.call
+                local.append(None)
+                solvable.append(frozenset({z for z in used & wanted if _hash(symbols[z]) == _hash(call.symbol)}))
+                continue
+            expression = solution.one(statement.expression)
+            local.append(expression)
+            can = set()
+            for z in used & wanted:
+                slope = ca.jacobian(expression, symbols[z])
+                if not ca.depends_on(slope, symbols[z]) and not slope.is_zero() and self.is_constant(slope):
+                    can.add(z)
+            solvable.append(frozenset(can))
+        sequence, tears, residuals = tear(incidence, wanted, solvable)
+        block_solution = _Substitution()
+        assigned: list[tuple[int, Any]] = []
+        for e, z in sequence:
+            if statements[e].call is not None:
+                call, x, y = statements[e].call
+                arguments = block_solution.apply(solution.apply([x, y]))
+                slopes = [ca.SX.sym(f"{call.symbol}/d{axis}") for axis in "xy"]
+                number = self.table_index[(id(call.table), call.owner.path)]
+                calls.append(Call(call.symbol, slopes[0], slopes[1], number, arguments[0], arguments[1]))
+                continue
+            expression = block_solution.one(local[e])
+            value = _solve_for(expression, symbols[z])
+            block_solution.add(symbols[z], value)
+            assigned.append((z, value))
+        left = [block_solution.one(local[e]) for e in residuals]
+        tear_symbols = [symbols[z] for z in tears]
+        solved = _solve_linear(left, tear_symbols) if 0 < len(tears) <= _MAX_LINEAR_BLOCK else None
+        if solved is not None:
+            final = _Substitution()
+            for symbol, value in zip(tear_symbols, solved, strict=True):
+                final.add(symbol, value)
+                solution.add(symbol, value)
+            for z, value in assigned:
+                solution.add(symbols[z], final.one(value))
+            self._fix_calls(calls, final)
+            tears = []
+        else:
+            for z, value in assigned:
+                solution.add(symbols[z], value)
+            rows += [Row(value, statements[e].text) for value, e in zip(left, residuals, strict=True)]
+        return tears
+
+    @staticmethod
+    def _fix_calls(calls: list[Call], final: _Substitution) -> None:
+        for k, call in enumerate(calls):
+            x, y = final.apply([call.x, call.y])
+            calls[k] = Call(call.value, call.x_slope, call.y_slope, call.table, x, y)
+
+    def is_constant(self, expression: Any) -> bool:
+        """Whether it depends on parameters and numbers only, so that it cannot pass through zero during a run."""
+        known = self.e.symbols
+        return all(k in known and known[k].kind == "parameter" for k in _symbols(expression))
+
+    # ---- the result -----------------------------------------------------------------------------------------------------
+    def collect(
+        self,
+        rows: list[Row],
+        torn: list[int],
+        unknown_symbols: list[Any],
+        solution: _Substitution,
+        calls: list[Call],
+        explicit_ders: dict[int, Any],
+        externals: list[tuple[int, Symbol]],
+        declared_equations: int,
+        statements: list[_Statement],
+    ) -> UnitType:
+        symbols, ders = self.e.symbols, self.e.derivatives
+        values = {_hash(s): v for s, v in zip(solution.symbols, solution.values, strict=True)}
+        unknowns: list[Unknown] = []
+        state_rows: list[Row] = []
+        torn_keys = {_hash(unknown_symbols[z]) for z in torn}
+        text_of_der: dict[int, str] = {}
+        for statement in statements:
+            for key in _symbols(statement.expression):
+                text_of_der.setdefault(key, statement.text)
+        for key in (k for k in symbols if k in self.states):
+            s, der = symbols[key], ders[key]
+            unknowns.append(Unknown(s.path, s.symbol, der, s))
+            if _hash(der) in values:
+                state_rows.append(Row(der - values[_hash(der)], text_of_der.get(_hash(der), s.path)))
+        for key, s in symbols.items():
+            if key not in self.alias and key not in self.states and self.is_unknown(s):
+                if _hash(s.symbol) in torn_keys:
+                    unknowns.append(Unknown(s.path, s.symbol, None, s))
+                elif s.path in self.keep:
+                    unknowns.append(Unknown(s.path, s.symbol, None, s))
+                    rows.append(Row(s.symbol - values[_hash(s.symbol)], f"{s.path}: signal read by other units"))
+        if self.keep:
+            solution = self._without(solution, {u.path for u in unknowns})
+        order = {_hash(u.symbol): k for k, u in enumerate(unknowns)}
+        flows, recorded, aliases = [], [], {}
+        by_path = {s.path: key for key, s in symbols.items()}
+        for key, s in symbols.items():
+            if s.kind == "flow" and s.path.rpartition(".")[0] in self.boundary:
+                flows.append(BoundaryFlow(s.path, self._potential_of(s), self._final(s.symbol, solution)))
+            if key in self.alias:
+                target, sign = self.alias[key]
+                aliases[s.path] = (symbols[target].path, sign)
+            elif self.is_unknown(s) and key not in order:
+                recorded.append(Recorded(s.path, self._final(s.symbol, solution), s))
+        parameters = list(self.e.of_kind("parameter"))
+        discretes = list(self.e.of_kind("discrete"))
+        roots, whens = self._whens(parameters, discretes, order, by_path, solution)
+        final_rows = [Row(r.expression, r.text) for r in [*state_rows, *rows]]
+        roots += bend_roots([(r.expression, r.text) for r in final_rows] + [(f.expression, f.path) for f in flows])
+        free = [k for k, p in enumerate(parameters) if p.declaration.free]  # type: ignore[attr-defined]
+        initial = [
+            Row(self._final(eq.lhs - eq.rhs, solution), str(eq)) for eq in self.e.initial
+        ]
+        if len(initial) != len(free):
+            raise GustformError(
+                "GF3005",
+                f"{self.name} has {len(free)} free parameters and {len(initial)} initial equations: "
+                + ", ".join(parameters[k].path for k in free),
+                hint="one self.initial(...) for each free parameter",
+            )
+        return UnitType(
+            name=self.name,
+            component=self.component,
+            parameters=parameters,
+            unknowns=unknowns,
+            externals=[External(s.path, s.symbol, s) for _, s in externals],
+            inputs=[s for s in symbols.values() if self.is_input(s)],
+            discretes=discretes,
+            tables=self.e.tables,
+            calls=calls,
+            rows=final_rows,
+            flows=flows,
+            recorded=recorded,
+            aliases=aliases,
+            roots=roots,
+            whens=whens,
+            initial=initial,
+            free_parameters=free,
+            substituted=len(recorded),
+            declared_equations=declared_equations,
+        )
+
+    @staticmethod
+    def _without(solution: _Substitution, paths: set[str]) -> _Substitution:
+        kept = _Substitution()
+        for symbol, value in zip(solution.symbols, solution.values, strict=True):
+            if str(symbol) not in paths:
+                kept.add(symbol, value)
+        return kept
+
+    def _final(self, expression: Any, solution: _Substitution) -> Any:
+        return solution.one(self.prepared(expression))
+
+    def _potential_of(self, flow: Symbol) -> str:
+        assert flow.port is not None
+        port, _, name = flow.path.rpartition(".")
+        position = list(flow.port._flows).index(name)
+        return f"{port}.{list(flow.port._potentials)[position]}"
+
+    def _when_expressions(self) -> Iterable[Any]:
+        for when in self.e.whens:
+            if when.condition is not None:
+                yield when.condition
+            for _, value in [*when.assign, *when.reinit]:
+                yield value
+
+    def _whens(
+        self,
+        parameters: list[Symbol],
+        discretes: list[Symbol],
+        order: dict[int, int],
+        by_path: dict[str, int],
+        solution: _Substitution,
+    ) -> tuple[list[Root], list[WhenClause]]:
+        roots: list[Root] = []
+        clauses: list[WhenClause] = []
+        parameter_index = {_hash(p.symbol): k for k, p in enumerate(parameters)}
+        discrete_index = {_hash(d.symbol): k for k, d in enumerate(discretes)}
+        for when in self.e.whens:
+            text = f"{when.path + ': ' if when.path else ''}{when.source}"
+            root, period = -1, -1
+            if when.condition is not None:
+                root = len(roots)
+                condition = indicator(self._final(when.condition, solution), text)
+                roots.append(Root(1, condition, text))
+            else:
+                period = parameter_index.get(_hash(when.period), -1) if when.period.is_symbolic() else -1
+                if period < 0:
+                    raise GustformError("GF1015", f"the sample period must be a parameter in {text}")
+            reinit = []
+            for target, value in when.reinit:
+                symbol = self.alias_substitution.one(target)
+                if not symbol.is_symbolic() or _hash(symbol) not in self.states:
+                    raise GustformError("GF1016", f"reinit needs a state; {target} is none in {text}")
+                reinit.append((order[_hash(symbol)], self._final(value, solution)))
+            assign = [(discrete_index[_hash(t)], self._final(v, solution)) for t, v in when.assign]
+            clauses.append(WhenClause(root, period, assign, reinit, text))
+        return roots, clauses
+
+    # ---- diagnosis --------------------------------------------------------------------------------------------------
+    def check_balance(
+        self, statements: list[_Statement], labels: list[str], incidence: list[frozenset[int]], n_own: int
+    ) -> None:
+        if len(statements) == n_own:
+            return
+        matching = match(incidence, n_own)
+        if len(statements) > n_own:
+            equations, unknowns = overdetermined_part(incidence, matching)
+            what, code = "over-determined", "GF3010"
+            hint = "leaving out one of the equations named"
+        else:
+            equations, unknowns = underdetermined_part(incidence, matching)
+            what, code = "under-determined", "GF3011"
+            hint = "one more equation for one of the variables named"
+        raise GustformError(
+            code,
+            f"{self.name} is {what}: {len(statements)} equations for {n_own} unknowns. "
+            f"Suspects: variables {_list(labels[z] for z in unknowns)}; "
+            f"equations {_list(statements[e].text for e in equations)}",
+            hint=hint,
+        )
+
+    def report_singular(
+        self, statements: list[_Statement], labels: list[str], incidence: list[frozenset[int]], matching: Matching
+    ) -> None:
+        equations, _ = overdetermined_part(incidence, matching)
+        _, unknowns = underdetermined_part(incidence, matching)
+        constraint = [e for e in equations if not incidence[e]]
+        if constraint:
+            raise GustformError(
+                "GF3013",
+                f"{self.name}: {statements[constraint[0]].text} constrains states only (index above 1)",
+                hint="joining the two states by a resistance or a spring, or one state instead of two",
+            )
+        raise GustformError(
+            "GF3012",
+            f"{self.name} is structurally singular: no equation is left for {_list(labels[z] for z in unknowns)}; "
+            f"too many for the same variables: {_list(statements[e].text for e in equations)}",
+            hint="an equation that contains one of the variables named",
+        )
+
+
+def _list(names: Iterable[str], most: int = 6) -> str:
+    items = list(names)
+    text = "; ".join(items[:most]) or "none"
+    return text + (f"; and {len(items) - most} more" if len(items) > most else "")
+
+
+def _solve_for(expression: Any, symbol: Any) -> Any:
+    """The value of `symbol` in expression = 0, which is linear in it."""
+    for op, sign in ((ca.OP_SUB, 1), (ca.OP_ADD, -1)):
+        if expression.is_op(op):
+            a, b = expression.dep(0), expression.dep(1)
+            if a.is_symbolic() and _hash(a) == _hash(symbol) and not ca.depends_on(b, symbol):
+                return sign * b
+            if b.is_symbolic() and _hash(b) == _hash(symbol) and not ca.depends_on(a, symbol):
+                return sign * a
+    slope = ca.jacobian(expression, symbol)
+    rest = ca.substitute(expression, symbol, ca.SX(0))
+    return -rest / slope
+
+
+def _solve_linear(residuals: list[Any], symbols: list[Any]) -> list[Any] | None:
+    """Cramer's rule for up to three unknowns; None if the residuals are not linear in them."""
+    vector, unknown = ca.vertcat(*residuals), ca.vertcat(*symbols)
+    matrix = ca.jacobian(vector, unknown)
+    if ca.depends_on(matrix, unknown):
+        return None
+    right = -ca.substitute(vector, unknown, ca.SX.zeros(len(symbols)))
+    matrix = ca.densify(matrix)
+    determinant = _det(matrix)
+    if determinant.is_zero():
+        return None
+    inverse = 1 / determinant
+    result = []
+    for k in range(len(symbols)):
+        replaced = ca.SX(matrix)
+        replaced[:, k] = right
+        result.append(_det(replaced) * inverse)
+    return result
+
+
+def _det(m: Any) -> Any:
+    if m.shape[0] == 1:
+        return m[0, 0]
+    if m.shape[0] == 2:
+        return m[0, 0] * m[1, 1] - m[0, 1] * m[1, 0]
+    return (
+        m[0, 0] * (m[1, 1] * m[2, 2] - m[1, 2] * m[2, 1])
+        - m[0, 1] * (m[1, 0] * m[2, 2] - m[1, 2] * m[2, 0])
+        + m[0, 2] * (m[1, 0] * m[2, 1] - m[1, 1] * m[2, 0])
+    )
+
+
+def flatten(
+    component: Component, signals: frozenset[str] = frozenset(), keep: frozenset[str] = frozenset()
+) -> UnitType:
+    """The unit type of a component.
+
+    `signals`: inputs of the unit that are wired to other units (the rest are constants or series). `keep`: variables
+    that must stay unknowns because other units read them. Raises GF1xxx and GF3xxx with the equation's place.
+    """
+    return _Flattener(component, signals, keep).run()
