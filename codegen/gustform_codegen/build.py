@@ -11,7 +11,6 @@ from gustform.language.component import Component, suggest
 from gustform.language.declare import Input
 from gustform.language.errors import GustformError
 from gustform.language.system import System
-
 from gustform_codegen.cache import KernelCache
 from gustform_codegen.emit.kernel import Kernel, emit_kernel
 from gustform_codegen.flatten import flatten
@@ -96,9 +95,7 @@ def build(system: System, cache: KernelCache) -> Built:
     types: list[tuple[UnitType, Kernel, str, list[str]]] = []
     for names in groups.values():
         first = names[0]
-        unit, kernel = unit_type(
-            system.components[first], wired.get(first, frozenset()), kept.get(first, frozenset())
-        )
+        unit, kernel = unit_type(system.components[first], wired.get(first, frozenset()), kept.get(first, frozenset()))
         types.append((unit, kernel, str(cache.get(kernel.text, unit.name)), names))
     linked = link(system, types)
     return Built(linked, cache.compilations - compiled_before, time.perf_counter() - begin)

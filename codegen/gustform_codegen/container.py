@@ -10,8 +10,9 @@ import struct
 from typing import Any
 
 import numpy as np
-from gustform.language.errors import GustformError
 from numpy.typing import NDArray
+
+from gustform.language.errors import GustformError
 
 MAGIC = b"GUSTTAB1"
 VERSION = 1

@@ -31,7 +31,9 @@ class TypeEvaluator:
         self.p = ca.vertcat(*[s.symbol for s in unit.parameters])
         self._cj = ca.SX.sym("cj")
         self._values = ca.vertcat(
-            *[r.expression for r in unit.rows], *[f.expression for f in unit.flows], *[r.expression for r in unit.initial]
+            *[r.expression for r in unit.rows],
+            *[f.expression for f in unit.flows],
+            *[r.expression for r in unit.initial],
         )
         call_symbols = [s for c in unit.calls for s in (c.value, c.x_slope, c.y_slope)]
         self._calls = ca.vertcat(*call_symbols) if call_symbols else ca.SX.sym("calls", 0)
@@ -80,6 +82,7 @@ class TypeEvaluator:
             total = ca.jacobian(self._values, columns)
             gradients: list[Any] = []
             for number, call in enumerate(unit.calls):
+
                 def whole(e: Any, number: int = number) -> Any:
                     g = ca.jacobian(e, columns)
                     for c, previous in zip(unit.calls[:number], gradients, strict=True):

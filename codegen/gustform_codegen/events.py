@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import casadi as ca
-from gustform.language.errors import GustformError, Place
 
+from gustform.language.errors import GustformError, Place
 from gustform_codegen.unit_type import Root
 
 _COMPARISONS = (ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE)
@@ -23,7 +23,8 @@ def indicator(condition: Any, text: str) -> Any:
     if condition.is_op(ca.OP_NOT):
         return -indicator(condition.dep(0), text)
     raise GustformError(
-        "GF1017", f"a when-condition must be made of < and >, logic_and, logic_or; got {condition} in {text}",
+        "GF1017",
+        f"a when-condition must be made of < and >, logic_and, logic_or; got {condition} in {text}",
         hint="self.when(a > b, ...)",
     )
 

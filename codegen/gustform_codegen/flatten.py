@@ -12,23 +12,18 @@ from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
+
 from gustform.language.component import Component
-from gustform.language.connector import Potential
 from gustform.language.errors import GustformError, Place
 from gustform.language.operators import constants, table_calls
-from gustform.language.scope import Elaborated, Equation, Symbol, elaborate
+from gustform.language.scope import Elaborated, Symbol, elaborate
 from gustform.language.unitcheck import check_units
-
 from gustform_codegen.alias import AliasSets, as_alias
+from gustform_codegen.balance import check_balance, refuse_singular
+from gustform_codegen.connections import connection_equations
 from gustform_codegen.events import bend_roots, indicator, refuse_bare_comparisons
-from gustform_codegen.structure import (
-    Matching,
-    blocks,
-    match,
-    overdetermined_part,
-    tear,
-    underdetermined_part,
-)
+from gustform_codegen.structure import Matching, blocks, match, tear
+from gustform_codegen.symbolic import Substitution, key_of, keys_in, solve_for, solve_linear
 from gustform_codegen.unit_type import (
     BoundaryFlow,
     Call,
@@ -55,42 +50,6 @@ class _Statement:
     call: Any = None
 
 
-def _hash(symbol: Any) -> int:
-    return int(symbol.element_hash())
-
-
-def _symbols(expression: Any) -> list[int]:
-    return [_hash(s) for s in ca.symvar(expression)]
-
-
-class _Substitution:
-    """Symbols and what they are replaced by, applied in one pass."""
-
-    def __init__(self) -> None:
-        self.symbols: list[Any] = []
-        self.values: list[Any] = []
-        self.known: set[int] = set()
-
-    def add(self, symbol: Any, value: Any) -> None:
-        self.symbols.append(symbol)
-        self.values.append(value)
-        self.known.add(_hash(symbol))
-
-    def apply(self, expressions: list[Any]) -> list[Any]:
-        if not self.symbols or not expressions:
-            return expressions
-        used = {key for e in expressions for key in _symbols(e)} & self.known
-        if not used:
-            return expressions
-        chosen = [k for k, s in enumerate(self.symbols) if _hash(s) in used]
-        return list(
-            ca.substitute(expressions, [self.symbols[k] for k in chosen], [self.values[k] for k in chosen])
-        )
-
-    def one(self, expression: Any) -> Any:
-        return self.apply([expression])[0]
-
-
 class _Flattener:
     def __init__(self, component: Component, signals: frozenset[str], keep: frozenset[str]) -> None:
         self.component = component
@@ -101,11 +60,11 @@ class _Flattener:
         check_units(self.e)
         self.boundary = {path for path in self.e.ports if "." not in path}
         self.table_index = {(id(t.declaration), t.owner.path): k for k, t in enumerate(self.e.tables)}
-        self.constants = _Substitution()
+        self.constants = Substitution()
         for constant in constants.values():
             self.constants.add(constant.symbol, ca.SX(constant.value))
 
-    # ---- who is known, who is not ---------------------------------------------------------------------------------
+    # ---- who is known, who is not ----
     def is_external(self, s: Symbol) -> bool:
         if s.kind == "potential":
             return s.path.rpartition(".")[0] in self.boundary
@@ -119,61 +78,14 @@ class _Flattener:
             return False
         return not self.is_external(s) and not self.is_input(s)
 
-    # ---- connections ------------------------------------------------------------------------------------------------
-    def connection_statements(self) -> list[_Statement]:
-        parent: dict[tuple[str, bool], tuple[str, bool]] = {}
-
-        def find(key: tuple[str, bool]) -> tuple[str, bool]:
-            while parent.setdefault(key, key) != key:
-                key = parent[key]
-            return key
-
-        for a, b, path, _source in self.e.connections:
-            keys = []
-            for port in (a, b):
-                owner = port.path.rpartition(".")[0]
-                keys.append((port.path, owner != path))  # (port, seen from outside its component)
-            parent[find(keys[0])] = find(keys[1])
-        members: dict[tuple[str, bool], list[tuple[str, bool]]] = {}
-        for key in list(parent):
-            members.setdefault(find(key), []).append(key)
-        statements: list[_Statement] = []
-        for group in members.values():
-            ports = [self.e.ports[path] for path, _ in group]
-            text = "connection of " + ", ".join(path for path, _ in group)
-            connector = ports[0].connector
-            for name in connector._potentials:
-                statements += [
-                    _Statement(port.symbols[name] - ports[0].symbols[name], text, None) for port in ports[1:]
-                ]
-            for name in connector._flows:
-                terms = [port.symbols[name] if side else -port.symbols[name] for port, (_, side) in
-                         zip(ports, group, strict=True)]
-                statements.append(_Statement(sum(terms[1:], terms[0]), text, None))
-        connected = {key for key in parent}
-        for path, port in self.e.ports.items():
-            if path in self.boundary or (path, True) in connected:
-                continue
-            if not port.connector.optional:
-                raise GustformError(
-                    "GF3003",
-                    f"{self.name}: port {path} ({port.connector.description}) is not connected",
-                    hint=f"self.connect(self.{path}, ...) or optional=True at its declaration",
-                )
-            for name in port.connector._flows:
-                statements.append(_Statement(port.symbols[name], f"{path}.{name} = 0 (not connected)", None))
-        return statements
-
-    # ---- the phases ---------------------------------------------------------------------------------------------------
+    # ---- the phases ----
     def run(self) -> UnitType:
         statements = [
             _Statement(eq.lhs - eq.rhs, str(eq), Place(eq.source.file, eq.source.line)) for eq in self.e.equations
         ]
-        statements += self.connection_statements()
+        statements += [_Statement(e, text, None) for e, text in connection_equations(self.e, self.boundary)]
         declared_equations = len(statements)
-        statements = [
-            _Statement(self.constants.one(s.expression), s.text, s.place) for s in statements
-        ]
+        statements = [_Statement(self.constants.one(s.expression), s.text, s.place) for s in statements]
         for statement in statements:
             refuse_bare_comparisons(statement.expression, statement.text, statement.place)
         statements = self.eliminate_aliases(statements)
@@ -196,16 +108,21 @@ class _Flattener:
             pair = as_alias(statement.expression)
             if pair is not None:
                 a, b, sign = pair
-                ka, kb = _hash(a), _hash(b)
+                ka, kb = key_of(a), key_of(b)
                 mergeable = all(k in symbols and symbols[k].kind not in ("parameter", "discrete") for k in (ka, kb))
-                external_state = any(
-                    rank(x) == 3 and sets.find(y)[0] in ders for x, y in ((sets.find(ka)[0], kb), (sets.find(kb)[0], ka))
-                ) if mergeable else False
+                external_state = (
+                    any(
+                        rank(x) == 3 and sets.find(y)[0] in ders
+                        for x, y in ((sets.find(ka)[0], kb), (sets.find(kb)[0], ka))
+                    )
+                    if mergeable
+                    else False
+                )
                 if mergeable and not external_state and sets.join(ka, kb, sign):
                     continue
             rest.append(statement)
         self.alias: dict[int, tuple[int, int]] = {}
-        substitution = _Substitution()
+        substitution = Substitution()
         for key, s in symbols.items():
             target, sign = sets.find(key)
             if target != key:
@@ -227,9 +144,7 @@ class _Flattener:
                     hint="a state of the unit's own, coupled to the connector by a resistance or reactance",
                 )
         expressions = substitution.apply([s.expression for s in rest])
-        return [
-            _Statement(expression, s.text, s.place) for expression, s in zip(expressions, rest, strict=True)
-        ]
+        return [_Statement(expression, s.text, s.place) for expression, s in zip(expressions, rest, strict=True)]
 
     def prepared(self, expression: Any) -> Any:
         return self.alias_substitution.one(self.constants.one(expression))
@@ -238,11 +153,9 @@ class _Flattener:
         symbols, ders = self.e.symbols, self.e.derivatives
         # Table values are unknowns that their own statement defines.
         calls_used: dict[int, Any] = {}
-        pending = [s.expression for s in statements] + [
-            self.prepared(x) for x in self._when_expressions()
-        ]
+        pending = [s.expression for s in statements] + [self.prepared(x) for x in self._when_expressions()]
         while pending:
-            for key in _symbols(pending.pop()):
+            for key in keys_in(pending.pop()):
                 if key in table_calls and key not in calls_used:
                     call = table_calls[key]
                     calls_used[key] = (call, self.prepared(call.x), self.prepared(call.y))
@@ -262,36 +175,35 @@ class _Flattener:
         for call, _, _ in calls_used.values():
             unknown_symbols.append(call.symbol)
             labels.append(f"table value {call.symbol}")
-        index = {_hash(s): k for k, s in enumerate(unknown_symbols)}
+        index = {key_of(s): k for k, s in enumerate(unknown_symbols)}
         n_own = len(unknown_symbols)
-        externals = [
-            (key, s) for key, s in symbols.items() if self.is_external(s)
-        ]
+        externals = [(key, s) for key, s in symbols.items() if self.is_external(s)]
         external_index = {key: n_own + k for k, (key, _) in enumerate(externals)}
 
+        texts = [s.text for s in statements]
         incidence: list[frozenset[int]] = []
         with_external: list[frozenset[int]] = []
         for statement in statements:
-            used = _symbols(statement.expression)
+            used = keys_in(statement.expression)
             if statement.call is not None:
-                used = [_hash(statement.call[0].symbol), *_symbols(statement.call[1]), *_symbols(statement.call[2])]
+                used = [key_of(statement.call[0].symbol), *keys_in(statement.call[1]), *keys_in(statement.call[2])]
             incidence.append(frozenset(index[k] for k in used if k in index))
             with_external.append(incidence[-1] | {external_index[k] for k in used if k in external_index})
-        self.check_balance(statements, labels, incidence, n_own)
+        check_balance(self.name, texts, labels, incidence)
         matching = match(incidence, n_own)
         iterate: set[int] = set()
         left_over: list[int] = []
         if matching.free_equations:
             full = match(with_external, n_own + len(externals), matching)
             if full.free_equations:
-                self.report_singular(statements, labels, incidence, matching)
+                refuse_singular(self.name, texts, labels, incidence, matching)
             # An equation that fixes a connector potential: the unit's own unknown left over (a flow) is iterated on.
             left_over = [e for e, z in enumerate(full.unknown_of) if z >= n_own]
             iterate = {z for z in range(n_own) if full.equation_of[z] < 0}
             matching = full
         keep = {k for k, label in enumerate(labels) if label in self.keep}
 
-        solution = _Substitution()
+        solution = Substitution()
         rows: list[Row] = []
         torn: list[int] = sorted(iterate)
         calls: list[Call] = []
@@ -300,7 +212,6 @@ class _Flattener:
             [z if z < n_own and e not in set(left_over) else -1 for e, z in enumerate(matching.unknown_of)],
             matching.equation_of[:n_own],
         )
-        explicit_ders: dict[int, Any] = {}
         for block in blocks(inner, trimmed):
             unknowns = [trimmed.unknown_of[e] for e in block]
             torn += self.solve_block(
@@ -315,9 +226,7 @@ class _Flattener:
             )
         for e in left_over:
             rows.append(Row(solution.one(statements[e].expression), statements[e].text))
-        return self.collect(
-            rows, torn, unknown_symbols, solution, calls, explicit_ders, externals, declared_equations, statements
-        )
+        return self.collect(rows, torn, unknown_symbols, solution, calls, externals, declared_equations, statements)
 
     def solve_block(
         self,
@@ -325,7 +234,7 @@ class _Flattener:
         incidence: list[frozenset[int]],
         unknowns: list[int],
         symbols: list[Any],
-        solution: _Substitution,
+        solution: Substitution,
         rows: list[Row],
         calls: list[Call],
         keep: set[int],
@@ -338,7 +247,7 @@ class _Flattener:
             if statement.call is not None:
                 call, x, y = statement.call
                 local.append(None)
-                solvable.append(frozenset({z for z in used & wanted if _hash(symbols[z]) == _hash(call.symbol)}))
+                solvable.append(frozenset({z for z in used & wanted if key_of(symbols[z]) == key_of(call.symbol)}))
                 continue
             expression = solution.one(statement.expression)
             local.append(expression)
@@ -349,7 +258,7 @@ class _Flattener:
                     can.add(z)
             solvable.append(frozenset(can))
         sequence, tears, residuals = tear(incidence, wanted, solvable)
-        block_solution = _Substitution()
+        block_solution = Substitution()
         assigned: list[tuple[int, Any]] = []
         for e, z in sequence:
             if statements[e].call is not None:
@@ -360,14 +269,14 @@ class _Flattener:
                 calls.append(Call(call.symbol, slopes[0], slopes[1], number, arguments[0], arguments[1]))
                 continue
             expression = block_solution.one(local[e])
-            value = _solve_for(expression, symbols[z])
+            value = solve_for(expression, symbols[z])
             block_solution.add(symbols[z], value)
             assigned.append((z, value))
         left = [block_solution.one(local[e]) for e in residuals]
         tear_symbols = [symbols[z] for z in tears]
-        solved = _solve_linear(left, tear_symbols) if 0 < len(tears) <= _MAX_LINEAR_BLOCK else None
+        solved = solve_linear(left, tear_symbols) if 0 < len(tears) <= _MAX_LINEAR_BLOCK else None
         if solved is not None:
-            final = _Substitution()
+            final = Substitution()
             for symbol, value in zip(tear_symbols, solved, strict=True):
                 final.add(symbol, value)
                 solution.add(symbol, value)
@@ -382,7 +291,7 @@ class _Flattener:
         return tears
 
     @staticmethod
-    def _fix_calls(calls: list[Call], final: _Substitution) -> None:
+    def _fix_calls(calls: list[Call], final: Substitution) -> None:
         for k, call in enumerate(calls):
             x, y = final.apply([call.x, call.y])
             calls[k] = Call(call.value, call.x_slope, call.y_slope, call.table, x, y)
@@ -390,45 +299,44 @@ class _Flattener:
     def is_constant(self, expression: Any) -> bool:
         """Whether it depends on parameters and numbers only, so that it cannot pass through zero during a run."""
         known = self.e.symbols
-        return all(k in known and known[k].kind == "parameter" for k in _symbols(expression))
+        return all(k in known and known[k].kind == "parameter" for k in keys_in(expression))
 
-    # ---- the result -----------------------------------------------------------------------------------------------------
+    # ---- the result ----
     def collect(
         self,
         rows: list[Row],
         torn: list[int],
         unknown_symbols: list[Any],
-        solution: _Substitution,
+        solution: Substitution,
         calls: list[Call],
-        explicit_ders: dict[int, Any],
         externals: list[tuple[int, Symbol]],
         declared_equations: int,
         statements: list[_Statement],
     ) -> UnitType:
         symbols, ders = self.e.symbols, self.e.derivatives
-        values = {_hash(s): v for s, v in zip(solution.symbols, solution.values, strict=True)}
+        values = {key_of(s): v for s, v in zip(solution.symbols, solution.values, strict=True)}
         unknowns: list[Unknown] = []
         state_rows: list[Row] = []
-        torn_keys = {_hash(unknown_symbols[z]) for z in torn}
+        torn_keys = {key_of(unknown_symbols[z]) for z in torn}
         text_of_der: dict[int, str] = {}
         for statement in statements:
-            for key in _symbols(statement.expression):
+            for key in keys_in(statement.expression):
                 text_of_der.setdefault(key, statement.text)
         for key in (k for k in symbols if k in self.states):
             s, der = symbols[key], ders[key]
             unknowns.append(Unknown(s.path, s.symbol, der, s))
-            if _hash(der) in values:
-                state_rows.append(Row(der - values[_hash(der)], text_of_der.get(_hash(der), s.path)))
+            if key_of(der) in values:
+                state_rows.append(Row(der - values[key_of(der)], text_of_der.get(key_of(der), s.path)))
         for key, s in symbols.items():
             if key not in self.alias and key not in self.states and self.is_unknown(s):
-                if _hash(s.symbol) in torn_keys:
+                if key_of(s.symbol) in torn_keys:
                     unknowns.append(Unknown(s.path, s.symbol, None, s))
                 elif s.path in self.keep:
                     unknowns.append(Unknown(s.path, s.symbol, None, s))
-                    rows.append(Row(s.symbol - values[_hash(s.symbol)], f"{s.path}: signal read by other units"))
+                    rows.append(Row(s.symbol - values[key_of(s.symbol)], f"{s.path}: signal read by other units"))
         if self.keep:
             solution = self._without(solution, {u.path for u in unknowns})
-        order = {_hash(u.symbol): k for k, u in enumerate(unknowns)}
+        order = {key_of(u.symbol): k for k, u in enumerate(unknowns)}
         flows, recorded, aliases = [], [], {}
         by_path = {s.path: key for key, s in symbols.items()}
         for key, s in symbols.items():
@@ -445,9 +353,7 @@ class _Flattener:
         final_rows = [Row(r.expression, r.text) for r in [*state_rows, *rows]]
         roots += bend_roots([(r.expression, r.text) for r in final_rows] + [(f.expression, f.path) for f in flows])
         free = [k for k, p in enumerate(parameters) if p.declaration.free]  # type: ignore[attr-defined]
-        initial = [
-            Row(self._final(eq.lhs - eq.rhs, solution), str(eq)) for eq in self.e.initial
-        ]
+        initial = [Row(self._final(eq.lhs - eq.rhs, solution), str(eq)) for eq in self.e.initial]
         if len(initial) != len(free):
             raise GustformError(
                 "GF3005",
@@ -478,14 +384,14 @@ class _Flattener:
         )
 
     @staticmethod
-    def _without(solution: _Substitution, paths: set[str]) -> _Substitution:
-        kept = _Substitution()
+    def _without(solution: Substitution, paths: set[str]) -> Substitution:
+        kept = Substitution()
         for symbol, value in zip(solution.symbols, solution.values, strict=True):
             if str(symbol) not in paths:
                 kept.add(symbol, value)
         return kept
 
-    def _final(self, expression: Any, solution: _Substitution) -> Any:
+    def _final(self, expression: Any, solution: Substitution) -> Any:
         return solution.one(self.prepared(expression))
 
     def _potential_of(self, flow: Symbol) -> str:
@@ -507,12 +413,12 @@ class _Flattener:
         discretes: list[Symbol],
         order: dict[int, int],
         by_path: dict[str, int],
-        solution: _Substitution,
+        solution: Substitution,
     ) -> tuple[list[Root], list[WhenClause]]:
         roots: list[Root] = []
         clauses: list[WhenClause] = []
-        parameter_index = {_hash(p.symbol): k for k, p in enumerate(parameters)}
-        discrete_index = {_hash(d.symbol): k for k, d in enumerate(discretes)}
+        parameter_index = {key_of(p.symbol): k for k, p in enumerate(parameters)}
+        discrete_index = {key_of(d.symbol): k for k, d in enumerate(discretes)}
         for when in self.e.whens:
             text = f"{when.path + ': ' if when.path else ''}{when.source}"
             root, period = -1, -1
@@ -521,112 +427,18 @@ class _Flattener:
                 condition = indicator(self._final(when.condition, solution), text)
                 roots.append(Root(1, condition, text))
             else:
-                period = parameter_index.get(_hash(when.period), -1) if when.period.is_symbolic() else -1
+                period = parameter_index.get(key_of(when.period), -1) if when.period.is_symbolic() else -1
                 if period < 0:
                     raise GustformError("GF1015", f"the sample period must be a parameter in {text}")
             reinit = []
             for target, value in when.reinit:
                 symbol = self.alias_substitution.one(target)
-                if not symbol.is_symbolic() or _hash(symbol) not in self.states:
+                if not symbol.is_symbolic() or key_of(symbol) not in self.states:
                     raise GustformError("GF1016", f"reinit needs a state; {target} is none in {text}")
-                reinit.append((order[_hash(symbol)], self._final(value, solution)))
-            assign = [(discrete_index[_hash(t)], self._final(v, solution)) for t, v in when.assign]
+                reinit.append((order[key_of(symbol)], self._final(value, solution)))
+            assign = [(discrete_index[key_of(t)], self._final(v, solution)) for t, v in when.assign]
             clauses.append(WhenClause(root, period, assign, reinit, text))
         return roots, clauses
-
-    # ---- diagnosis --------------------------------------------------------------------------------------------------
-    def check_balance(
-        self, statements: list[_Statement], labels: list[str], incidence: list[frozenset[int]], n_own: int
-    ) -> None:
-        if len(statements) == n_own:
-            return
-        matching = match(incidence, n_own)
-        if len(statements) > n_own:
-            equations, unknowns = overdetermined_part(incidence, matching)
-            what, code = "over-determined", "GF3010"
-            hint = "leaving out one of the equations named"
-        else:
-            equations, unknowns = underdetermined_part(incidence, matching)
-            what, code = "under-determined", "GF3011"
-            hint = "one more equation for one of the variables named"
-        raise GustformError(
-            code,
-            f"{self.name} is {what}: {len(statements)} equations for {n_own} unknowns. "
-            f"Suspects: variables {_list(labels[z] for z in unknowns)}; "
-            f"equations {_list(statements[e].text for e in equations)}",
-            hint=hint,
-        )
-
-    def report_singular(
-        self, statements: list[_Statement], labels: list[str], incidence: list[frozenset[int]], matching: Matching
-    ) -> None:
-        equations, _ = overdetermined_part(incidence, matching)
-        _, unknowns = underdetermined_part(incidence, matching)
-        constraint = [e for e in equations if not incidence[e]]
-        if constraint:
-            raise GustformError(
-                "GF3013",
-                f"{self.name}: {statements[constraint[0]].text} constrains states only (index above 1)",
-                hint="joining the two states by a resistance or a spring, or one state instead of two",
-            )
-        raise GustformError(
-            "GF3012",
-            f"{self.name} is structurally singular: no equation is left for {_list(labels[z] for z in unknowns)}; "
-            f"too many for the same variables: {_list(statements[e].text for e in equations)}",
-            hint="an equation that contains one of the variables named",
-        )
-
-
-def _list(names: Iterable[str], most: int = 6) -> str:
-    items = list(names)
-    text = "; ".join(items[:most]) or "none"
-    return text + (f"; and {len(items) - most} more" if len(items) > most else "")
-
-
-def _solve_for(expression: Any, symbol: Any) -> Any:
-    """The value of `symbol` in expression = 0, which is linear in it."""
-    for op, sign in ((ca.OP_SUB, 1), (ca.OP_ADD, -1)):
-        if expression.is_op(op):
-            a, b = expression.dep(0), expression.dep(1)
-            if a.is_symbolic() and _hash(a) == _hash(symbol) and not ca.depends_on(b, symbol):
-                return sign * b
-            if b.is_symbolic() and _hash(b) == _hash(symbol) and not ca.depends_on(a, symbol):
-                return sign * a
-    slope = ca.jacobian(expression, symbol)
-    rest = ca.substitute(expression, symbol, ca.SX(0))
-    return -rest / slope
-
-
-def _solve_linear(residuals: list[Any], symbols: list[Any]) -> list[Any] | None:
-    """Cramer's rule for up to three unknowns; None if the residuals are not linear in them."""
-    vector, unknown = ca.vertcat(*residuals), ca.vertcat(*symbols)
-    matrix = ca.jacobian(vector, unknown)
-    if ca.depends_on(matrix, unknown):
-        return None
-    right = -ca.substitute(vector, unknown, ca.SX.zeros(len(symbols)))
-    matrix = ca.densify(matrix)
-    determinant = _det(matrix)
-    if determinant.is_zero():
-        return None
-    inverse = 1 / determinant
-    result = []
-    for k in range(len(symbols)):
-        replaced = ca.SX(matrix)
-        replaced[:, k] = right
-        result.append(_det(replaced) * inverse)
-    return result
-
-
-def _det(m: Any) -> Any:
-    if m.shape[0] == 1:
-        return m[0, 0]
-    if m.shape[0] == 2:
-        return m[0, 0] * m[1, 1] - m[0, 1] * m[1, 0]
-    return (
-        m[0, 0] * (m[1, 1] * m[2, 2] - m[1, 2] * m[2, 1])
-        - m[0, 1] * (m[1, 0] * m[2, 2] - m[1, 2] * m[2, 0])
-        + m[0, 2] * (m[1, 0] * m[2, 1] - m[1, 1] * m[2, 0])
-    )
 
 
 def flatten(

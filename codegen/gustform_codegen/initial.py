@@ -13,9 +13,9 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from gustform.language.errors import GustformError
 from numpy.typing import NDArray
 
+from gustform.language.errors import GustformError
 from gustform_codegen.evaluate import Array, TypeEvaluator
 from gustform_codegen.link import Linked
 from gustform_codegen.table import SystemTable
@@ -172,7 +172,7 @@ class _Problem:
         return f"row {row}"
 
 
-class _Residual(ca.Callback):  # type: ignore[misc]
+class _Residual(ca.Callback):
     def __init__(self, problem: _Problem, row_scale: Array) -> None:
         ca.Callback.__init__(self)
         self.problem, self.row_scale = problem, row_scale
@@ -189,7 +189,7 @@ class _Residual(ca.Callback):  # type: ignore[misc]
     def has_reverse(self, n: int) -> bool:
         return True
 
-    def get_reverse(self, n: int, name: str, inames: list[str], onames: list[str], options: dict[str, Any]) -> Any:
+    def get_reverse(self, n: int, name: str, inames: Any, onames: Any, options: Any) -> Any:
         x, p = ca.MX.sym("x", self.problem.n_columns), ca.MX.sym("p", 0)
         g, seed = ca.MX.sym("g", self.problem.n_rows), ca.MX.sym("seed", self.problem.n_rows, n)
         return ca.Function(
@@ -202,12 +202,12 @@ class _Residual(ca.Callback):  # type: ignore[misc]
     def get_sparsity_out(self, i: int) -> Any:
         return ca.Sparsity.dense(self.problem.n_rows, 1)
 
-    def eval(self, arg: list[Any]) -> list[Any]:
+    def eval(self, arg: Any) -> list[Any]:
         x = np.asarray(arg[0]).ravel() * self.problem.scale
         return [ca.DM(self.problem.residual(x) * self.row_scale)]
 
 
-class _Jacobian(ca.Callback):  # type: ignore[misc]
+class _Jacobian(ca.Callback):
     def __init__(self, problem: _Problem, row_scale: Array) -> None:
         ca.Callback.__init__(self)
         self.problem, self.row_scale = problem, row_scale
@@ -225,7 +225,7 @@ class _Jacobian(ca.Callback):  # type: ignore[misc]
     def get_sparsity_out(self, i: int) -> Any:
         return ca.Sparsity.dense(self.problem.n_rows, 1) if i == 0 else self.problem.pattern
 
-    def eval(self, arg: list[Any]) -> list[Any]:
+    def eval(self, arg: Any) -> list[Any]:
         p = self.problem
         x = np.asarray(arg[0]).ravel() * p.scale
         values = p.jacobian(x) * self.row_scale[p.entry_row] * p.scale[p.entry_column]
@@ -297,7 +297,10 @@ def _in_place(linked: Linked, problem: _Problem, x: Array, iterations: int, larg
         for j, index in enumerate(t.unit.free_parameters):
             parameters[:, index] = x[free[:, j]]
             free_values.update(
-                {f"{name}.{t.unit.parameters[index].path}": float(v) for name, v in zip(t.names, x[free[:, j]], strict=True)}
+                {
+                    f"{name}.{t.unit.parameters[index].path}": float(v)
+                    for name, v in zip(t.names, x[free[:, j]], strict=True)
+                }
             )
         types.append(replace(t.table, parameters=parameters))
     table = replace(linked.table, types=types, start=x[: problem.n].copy(), start_derivative=derivative)
@@ -311,10 +314,7 @@ def _report_failure(problem: _Problem, x: Array, residual: Array, status: str) -
         problem.column_name(k)
         for k in range(problem.n_columns)
         if problem.low[k] < problem.high[k]
-        and (
-            x[k] - problem.low[k] < 1e-6 * problem.scale[k]
-            or problem.high[k] - x[k] < 1e-6 * problem.scale[k]
-        )
+        and (x[k] - problem.low[k] < 1e-6 * problem.scale[k] or problem.high[k] - x[k] < 1e-6 * problem.scale[k])
     ]
     bounds = f" At a bound: {', '.join(at_bound[:5])}." if at_bound else ""
     raise GustformError(

@@ -13,12 +13,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+
 from gustform.language.component import Component, suggest
 from gustform.language.connector import Connector
 from gustform.language.declare import Parameter
 from gustform.language.errors import GustformError
 from gustform.language.system import Constant, Series, System
-
 from gustform_codegen.emit.kernel import Kernel
 from gustform_codegen.structure import match, overdetermined_part, underdetermined_part
 from gustform_codegen.table import Channel, LookupTable, SeriesTable, SystemTable, TypeTable
@@ -143,7 +143,7 @@ def _channel(t: LinkedType, k: int, path: str, name: str, sign: int) -> tuple[Ch
     return None
 
 
-# ---- connection sets --------------------------------------------------------------------------------------------------
+# ---- connection sets ----
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,10 +180,12 @@ def connection_sets(system: System) -> list[_ConnectionSet]:
                 )
             if path in degree:
                 groups.setdefault(find(path), []).append(path)
-    return [_ConnectionSet(ports, system.port(ports[0]), max(ports, key=lambda p: degree[p])) for ports in groups.values()]
+    return [
+        _ConnectionSet(ports, system.port(ports[0]), max(ports, key=lambda p: degree[p])) for ports in groups.values()
+    ]
 
 
-# ---- linking ----------------------------------------------------------------------------------------------------------
+# ---- linking ----
 
 
 def link(system: System, types: list[tuple[UnitType, Kernel, str, list[str]]]) -> Linked:
@@ -323,9 +325,7 @@ def _start_values(t: LinkedType) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, 
                 starts.append(
                     owner.number(port.start.get(name, getattr(declared, "start", 0.0)) if port else declared.start)
                 )
-                nominals.append(
-                    owner.number(port.nominal.get(name, declared.nominal) if port else declared.nominal)
-                )
+                nominals.append(owner.number(port.nominal.get(name, declared.nominal) if port else declared.nominal))
             cache[id(component)] = (starts, nominals)
         start[k], nominal[k] = cache[id(component)]
     return start, nominal
@@ -438,7 +438,7 @@ def _schedule(
     return result
 
 
-# ---- structure of the whole -------------------------------------------------------------------------------------------
+# ---- structure of the whole ----
 
 
 def check_structure(linked: Linked) -> None:

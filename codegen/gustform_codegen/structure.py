@@ -140,9 +140,9 @@ def underdetermined_part(incidence: Incidence, matching: Matching) -> tuple[list
     return sorted(equations), sorted(unknowns)
 
 
-def tear(incidence: Incidence, unknowns: frozenset[int], solvable: Sequence[frozenset[int]]) -> tuple[
-    list[tuple[int, int]], list[int], list[int]
-]:
+def tear(
+    incidence: Incidence, unknowns: frozenset[int], solvable: Sequence[frozenset[int]]
+) -> tuple[list[tuple[int, int]], list[int], list[int]]:
     """Tear one block: (explicit assignments as (equation, unknown) in order, tearing unknowns, residual equations).
 
     `solvable[e]` are the unknowns equation e can be solved for explicitly. Greedy: solve whatever has one unknown

@@ -12,7 +12,6 @@ from pathlib import Path
 
 from gustform.language.errors import GustformError
 
-
 # Speed without breaking IEEE semantics: no errno for sqrt, the machine's own vector units, no fused contraction
 # beyond what ISO mode allows, so that results do not depend on the optimiser's mood.
 FLAGS = ("-std=c11", "-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math", "-fPIC", "-shared",
@@ -63,7 +62,8 @@ def compile_kernel(source: str, target: Path, include: Path, type_name: str) -> 
             )
         except (OSError, subprocess.TimeoutExpired) as failure:
             raise GustformError(
-                "GF4002", f"the C compiler {compiler.path} could not be run for {type_name}: {failure}",
+                "GF4002",
+                f"the C compiler {compiler.path} could not be run for {type_name}: {failure}",
                 hint="CC=gcc",
             ) from failure
         if run.returncode != 0 or not so_file.exists():
@@ -72,9 +72,10 @@ def compile_kernel(source: str, target: Path, include: Path, type_name: str) -> 
             lines = (run.stderr or run.stdout or f"exit code {run.returncode}").strip().splitlines()
             raise GustformError(
                 "GF4002",
-                f"the C compiler {compiler.path} failed on type {type_name}: {' | '.join(lines[:3])}; the source is kept in {kept}",
+                f"the C compiler {compiler.path} failed on type {type_name}: {' | '.join(lines[:3])}; "
+                f"the source is kept in {kept}",
                 hint="CC=gcc, or a newer compiler",
             )
         # The source stays beside the library, for whoever wants to read what was compiled.
-        os.replace(c_file, target.with_suffix(".c"))
-        os.replace(so_file, target)
+        c_file.replace(target.with_suffix(".c"))
+        so_file.replace(target)

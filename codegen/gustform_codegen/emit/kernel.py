@@ -177,12 +177,12 @@ def emit_kernel(unit: UnitType) -> Kernel:
     cases: list[str] = []
     for number, when in enumerate(unit.whens):
         targets = [f"d_new[{k}]" for k, _ in when.assign] + [f"y_new[{k}]" for k, _ in when.reinit]
-        lines = printer.body(
-            [v for _, v in [*when.assign, *when.reinit]], lambda k, text, t=targets: f"{t[k]} = {text};"
-        )
-        body = _function(
-            f"kernel_when_{number}", "const gust_point *at, double *y_new, double *d_new", lines, ""
-        )
+
+        def store(k: int, text: str, targets: list[str] = targets) -> str:
+            return f"{targets[k]} = {text};"
+
+        lines = printer.body([v for _, v in [*when.assign, *when.reinit]], store)
+        body = _function(f"kernel_when_{number}", "const gust_point *at, double *y_new, double *d_new", lines, "")
         used = "\n".join(lines)
         extra = [f"    (void){name};" for name in ("y_new", "d_new") if f"{name}[" not in used]
         functions += [*body[:-2], *extra, *body[-2:]]

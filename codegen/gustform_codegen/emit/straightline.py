@@ -13,8 +13,16 @@ from typing import Any
 import casadi as ca
 
 _INFIX = {
-    ca.OP_ADD: "+", ca.OP_SUB: "-", ca.OP_MUL: "*", ca.OP_DIV: "/",
-    ca.OP_LT: "<", ca.OP_LE: "<=", ca.OP_EQ: "==", ca.OP_NE: "!=", ca.OP_AND: "&&", ca.OP_OR: "||",
+    ca.OP_ADD: "+",
+    ca.OP_SUB: "-",
+    ca.OP_MUL: "*",
+    ca.OP_DIV: "/",
+    ca.OP_LT: "<",
+    ca.OP_LE: "<=",
+    ca.OP_EQ: "==",
+    ca.OP_NE: "!=",
+    ca.OP_AND: "&&",
+    ca.OP_OR: "||",
 }
 _BOOLEAN = {ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_AND, ca.OP_OR, ca.OP_NOT}
 _CALL = {
@@ -39,8 +47,14 @@ def literal(value: float) -> str:
 
 def _c_expression(op: int, a: Sequence[str]) -> str:
     if op in _BOOLEAN:
-        inner = f"{a[0]} == 0.0" if op == ca.OP_NOT else (
-            f"{a[0]} != 0.0 {_INFIX[op]} {a[1]} != 0.0" if op in (ca.OP_AND, ca.OP_OR) else f"{a[0]} {_INFIX[op]} {a[1]}"
+        inner = (
+            f"{a[0]} == 0.0"
+            if op == ca.OP_NOT
+            else (
+                f"{a[0]} != 0.0 {_INFIX[op]} {a[1]} != 0.0"
+                if op in (ca.OP_AND, ca.OP_OR)
+                else f"{a[0]} {_INFIX[op]} {a[1]}"
+            )
         )
         return f"({inner}) ? 1.0 : 0.0"
     if op in _INFIX:

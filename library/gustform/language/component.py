@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import difflib
 import linecache
-import os
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from gustform.language.connector import Connector
@@ -41,11 +41,11 @@ class Source:
     text: str
 
     def __str__(self) -> str:
-        return f"{self.text} ({os.path.basename(self.file)}:{self.line})"
+        return f"{self.text} ({Path(self.file).name}:{self.line})"
 
 
 def _equation_text(call: str) -> str:
-    """"C * der(v) = i" from the arguments of "self.eq(self.C * self.der(self.v), self.i)"."""
+    """ "C * der(v) = i" from the arguments of "self.eq(self.C * self.der(self.v), self.i)"."""
     depth = 0
     for position, character in enumerate(call):
         depth += (character in "([{") - (character in ")]}")
@@ -108,7 +108,7 @@ class Component:
                 hint=f"a component derived from {base.__name__}",
             )
 
-    # ---- declarations -------------------------------------------------------------------------------------------
+    # ---- declarations ----
     @classmethod
     def declarations(cls) -> dict[str, AnyDeclaration]:
         """All declarations by name, those of base classes first."""
@@ -124,7 +124,7 @@ class Component:
         """What may be given to the constructor: parameters, tables and parts."""
         return [name for name, value in cls._declarations.items() if isinstance(value, Parameter | Part | Table)]
 
-    # ---- numbers ------------------------------------------------------------------------------------------------
+    # ---- numbers ----
     @property
     def path(self) -> str:
         """Dotted name inside the unit ("" for the unit itself)."""
@@ -238,7 +238,7 @@ class Component:
                 key.append((name, self.part(name).structure_key()))
         return tuple(key)
 
-    # ---- equations ----------------------------------------------------------------------------------------------
+    # ---- equations ----
     def equations(self) -> None:
         """Written by subclasses: `self.eq(...)`, `self.connect(...)`, `self.initial(...)`, `self.when(...)`."""
 
@@ -263,7 +263,9 @@ class Component:
         """Time derivative of a declared variable."""
         return self._need_scope().derivative(variable, _caller())
 
-    def when(self, condition: Any, assign: dict[Any, Any] | None = None, *, reinit: dict[Any, Any] | None = None) -> None:
+    def when(
+        self, condition: Any, assign: dict[Any, Any] | None = None, *, reinit: dict[Any, Any] | None = None
+    ) -> None:
         """When `condition` (a comparison, or several joined by logic_and/logic_or) becomes true: set discrete
         values (`assign`) and states (`reinit`). The right-hand sides see the values before the event."""
         self._need_scope().add_when(condition, assign or {}, reinit or {}, _caller())

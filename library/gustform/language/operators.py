@@ -75,8 +75,10 @@ def dead_band(x: Any, half_width: Any) -> Any:
 def table2(table: Any, x: Any, y: Any) -> Any:
     """The value of a declared `Table` at (x, y): C2 in both arguments, arguments clamped to the grid."""
     declaration, owner = getattr(table, "declaration", None), getattr(table, "owner", None)
-    if declaration is None:
-        raise GustformError("GF1010", "table2 takes a declared Table as its first argument", hint="table2(self.cp, ...)")
+    if declaration is None or owner is None:
+        raise GustformError(
+            "GF1010", "table2 takes a declared Table as its first argument", hint="table2(self.cp, ...)"
+        )
     symbol = ca.SX.sym(f"{owner.path}.{declaration.name}#{next(_numbers)}")
     table_calls[symbol.element_hash()] = TableCall(symbol, declaration, owner, ca.SX(x), ca.SX(y))
     return symbol

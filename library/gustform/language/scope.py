@@ -35,7 +35,7 @@ class Symbol:
     description: str
     declaration: Declaration
     owner: Component
-    port: Connector | None = None
+    port: Any = None  # the Connector; Any because type checkers would take it for a descriptor here
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ class Scope:
         self.path = component.path
         self._items: dict[str, Any] = {}
 
-    # ---- symbols ------------------------------------------------------------------------------------------------
+    # ---- symbols ----
     def symbol(self, declaration: AnyDeclaration) -> Any:
         if declaration.name not in self._items:
             raise GustformError("GF1011", f"{self.path}.{declaration.name} is used before its component is set up")
@@ -113,8 +113,15 @@ class Scope:
     def _new(self, declaration: Declaration, path: str, kind: str, port: Connector | None = None) -> Any:
         symbol = ca.SX.sym(path)
         self.elaborated.symbols[symbol.element_hash()] = Symbol(
-            path, kind, symbol, declaration.unit, declaration.dimension, declaration.description, declaration,
-            self.component, port,
+            path,
+            kind,
+            symbol,
+            declaration.unit,
+            declaration.dimension,
+            declaration.description,
+            declaration,
+            self.component,
+            port,
         )
         return symbol
 
@@ -152,7 +159,7 @@ class Scope:
     def add_part(self, name: str, view: Component) -> None:
         self._items[name] = view
 
-    # ---- statements ---------------------------------------------------------------------------------------------
+    # ---- statements ----
     def _expression(self, value: Any, source: Source) -> Any:
         try:
             expression = ca.SX(value)

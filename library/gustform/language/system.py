@@ -110,9 +110,7 @@ class System:
         name, rest = self.split(path)
         inputs = self.components[name].declared(Input)
         if rest not in inputs:
-            raise GustformError(
-                "GF2009", f"{name} has no input {rest!r}", hint=suggest(rest, list(inputs))
-            )
+            raise GustformError("GF2009", f"{name} has no input {rest!r}", hint=suggest(rest, list(inputs)))
         declaration = inputs[rest]
         assert isinstance(declaration, Input)
         return declaration

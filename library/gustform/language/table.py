@@ -91,7 +91,7 @@ def _natural_second_derivatives(x: NDArray[np.float64], f: NDArray[np.float64]) 
     for k in range(1, n - 1):
         a[k, k - 1 : k + 2] = h[k - 1], 2 * (h[k - 1] + h[k]), h[k]
         r[k] = 6 * ((f[k + 1] - f[k]) / h[k] - (f[k] - f[k - 1]) / h[k - 1])
-    return np.linalg.solve(a, r)
+    return np.asarray(np.linalg.solve(a, r), dtype=np.float64)
 
 
 def _resample(x: NDArray[np.float64], f: NDArray[np.float64], onto: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -107,7 +107,7 @@ def _uniform_grid(x: NDArray[np.float64]) -> NDArray[np.float64]:
     steps = np.diff(x)
     if np.allclose(steps, steps.mean(), rtol=1e-6):
         return x
-    count = min(int(round((x[-1] - x[0]) / steps.min())) + 1, _MAX_GRID)
+    count = min(round(float((x[-1] - x[0]) / steps.min())) + 1, _MAX_GRID)
     return np.linspace(x[0], x[-1], count)
 
 
@@ -121,12 +121,10 @@ def _coefficients(f: NDArray[np.float64]) -> NDArray[np.float64]:
         right[k] = f[k]
     a[n, 0:3] = 1.0, -2.0, 1.0
     a[n + 1, n - 1 : n + 2] = 1.0, -2.0, 1.0
-    return np.linalg.solve(a, right)
+    return np.asarray(np.linalg.solve(a, right), dtype=np.float64)
 
 
-def _uniform_spline(
-    x: NDArray[np.float64], y: NDArray[np.float64], value: NDArray[np.float64]
-) -> dict[str, Any]:
+def _uniform_spline(x: NDArray[np.float64], y: NDArray[np.float64], value: NDArray[np.float64]) -> dict[str, Any]:
     gx, gy = _uniform_grid(x), _uniform_grid(y)
     on_x = value if gx is x else _resample(x, value, gx)
     on_grid = on_x if gy is y else _resample(y, on_x.T.copy(), gy).T

@@ -13,7 +13,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import lru_cache
+from functools import cache
 
 from gustform.language.errors import GustformError
 
@@ -80,7 +80,7 @@ _UNITS: dict[str, Dimension] = {
 _TOKEN = re.compile(r"\s*(?:(?P<name>[A-Za-z]+|1)(?:\^(?P<power>-?\d+))?|(?P<op>[*/()]))")
 
 
-@lru_cache(maxsize=None)
+@cache
 def dimension_of(unit: str) -> Dimension:
     """The dimension of a unit string such as "kg*m^2", "N*m/rad", "deg/(pu*s)" or "1/s".
 
