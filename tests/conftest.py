@@ -14,6 +14,8 @@ ROOT = Path(__file__).resolve().parent.parent
 os.environ["MPLBACKEND"] = "Agg"
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(variable, "1")
+# Kernels compiled by one test serve the others, and none are left among the user's own.
+os.environ.setdefault("GUSTFORM_CACHE", str(ROOT / "build" / "test-cache"))
 
 # No deadline: a first example may compile a kernel. In CI the examples are the same on every run, so that a red run
 # can be repeated; elsewhere new ones are tried each time.
