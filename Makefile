@@ -173,7 +173,7 @@ $(VENV_STAMPS)/docs: $(VENV_STAMPS)/base
 # CMake configures anew only when one of its files changed or the tree was made in another place; Ninja sees to the rest.
 $(BUILD_STAMPS)/release-configured: $(C_CONFIGURATION) | $(BUILD_STAMPS)/system
 	@$(QUIETLY) build/release.log cmake --fresh -S . -B build/release -G Ninja -DCMAKE_BUILD_TYPE=Release \
-		-DCMAKE_EXPORT_COMPILE_COMMANDS=ON -DGUST_TESTS=OFF
+		-DGUSTFORM_TESTS=OFF
 	@touch $@
 
 # Installed beside its Python package, where the editable install finds it.
@@ -185,7 +185,7 @@ $(BUILD_STAMPS)/installed: $(BUILD_STAMPS)/release-configured $(RUNTIME_SOURCES)
 
 $(BUILD_STAMPS)/sanitize-configured: $(C_CONFIGURATION) | $(BUILD_STAMPS)/system-tests
 	@$(QUIETLY) build/sanitize.log cmake --fresh -S . -B build/sanitize -G Ninja -DCMAKE_BUILD_TYPE=Debug \
-		-DGUST_TESTS=ON -DGUST_SANITIZE=ON
+		-DGUSTFORM_TESTS=ON -DGUSTFORM_SANITIZE=ON
 	@touch $@
 
 $(BUILD_STAMPS)/sanitize: $(BUILD_STAMPS)/sanitize-configured $(RUNTIME_SOURCES) $(TEST_SOURCES)
