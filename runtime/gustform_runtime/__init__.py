@@ -1,0 +1,18 @@
+"""The C runtime of gustform from Python: load a model table, run it, take its result rows.
+
+Knows numpy and ctypes only; what a model means is none of its business.
+"""
+
+from gustform_runtime.errors import RunError, Status
+from gustform_runtime.locate import gust_run_path, include_dir, library_path
+from gustform_runtime.simulation import Option, Simulation
+
+__all__ = [
+    "Option",
+    "RunError",
+    "Simulation",
+    "Status",
+    "gust_run_path",
+    "include_dir",
+    "library_path",
+]

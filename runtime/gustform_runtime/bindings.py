@@ -1,0 +1,90 @@
+"""The functions of libgustform.so with their types."""
+
+import ctypes
+from ctypes import POINTER, c_char_p, c_double, c_float, c_int, c_int32, c_int64, c_size_t, c_void_p
+from functools import cache
+
+from gustform_runtime.locate import library_path
+
+SERIES_READER = ctypes.CFUNCTYPE(c_int, c_void_p, c_int64, c_int64, POINTER(c_double), POINTER(c_double))
+ROW_SINK = ctypes.CFUNCTYPE(c_int, c_void_p, c_int64, POINTER(c_double), POINTER(c_float))
+
+
+class Statistics(ctypes.Structure):
+    """gust_statistics of gust_sim.h, field by field."""
+
+    _fields_ = (
+        ("steps", c_int64),
+        ("residual_evaluations", c_int64),
+        ("jacobian_evaluations", c_int64),
+        ("factorisations", c_int64),
+        ("refactorisations", c_int64),
+        ("error_test_failures", c_int64),
+        ("nonlinear_iterations", c_int64),
+        ("nonlinear_failures", c_int64),
+        ("root_evaluations", c_int64),
+        ("events", c_int64),
+        ("restarts", c_int64),
+        ("initial_iterations", c_int64),
+        ("rows", c_int64),
+        ("last_step", c_double),
+        ("last_order", c_int32),
+    )
+
+
+class OptionInfo(ctypes.Structure):
+    """gust_option_info of gust_sim.h, field by field."""
+
+    _fields_ = (
+        ("name", c_char_p),
+        ("sentence", c_char_p),
+        ("initial", c_double),
+        ("minimum", c_double),
+        ("maximum", c_double),
+    )
+
+
+_HANDLE = c_void_p
+_NUMBERS = c_void_p  # address of a numpy array
+
+# name: (result, arguments)
+_SIGNATURES: dict[str, tuple[type | None, tuple[type, ...]]] = {
+    "gust_status_text": (c_char_p, (c_int,)),
+    "gust_status_name": (c_char_p, (c_int,)),
+    "gust_status_list": (c_int, (c_int,)),
+    "gust_option_list": (POINTER(OptionInfo), (c_int,)),
+    "gust_model_load": (c_int, (c_char_p, POINTER(_HANDLE), c_char_p, c_size_t)),
+    "gust_model_parse": (c_int, (c_char_p, c_size_t, POINTER(_HANDLE), c_char_p, c_size_t)),
+    "gust_model_destroy": (None, (POINTER(_HANDLE),)),
+    "gust_model_n_unknowns": (c_int32, (_HANDLE,)),
+    "gust_model_n_nonzeros": (c_int32, (_HANDLE,)),
+    "gust_model_n_channels": (c_int32, (_HANDLE,)),
+    "gust_model_channel_name": (c_char_p, (_HANDLE, c_int32)),
+    "gust_model_channel_unit": (c_char_p, (_HANDLE, c_int32)),
+    "gust_sim_create": (c_int, (_HANDLE, POINTER(_HANDLE))),
+    "gust_sim_destroy": (None, (POINTER(_HANDLE),)),
+    "gust_sim_set_option": (c_int, (_HANDLE, c_char_p, c_double)),
+    "gust_sim_set_series_reader": (c_int, (_HANDLE, c_int32, SERIES_READER, c_void_p)),
+    "gust_sim_set_sink": (c_int, (_HANDLE, c_double, c_int32, ROW_SINK, c_void_p)),
+    "gust_sim_initialise": (c_int, (_HANDLE, c_double)),
+    "gust_sim_advance": (c_int, (_HANDLE, c_double, POINTER(c_double))),
+    "gust_sim_request_stop": (None, (_HANDLE,)),
+    "gust_sim_time": (c_double, (_HANDLE,)),
+    "gust_sim_message": (c_char_p, (_HANDLE,)),
+    "gust_sim_statistics": (c_int, (_HANDLE, POINTER(Statistics))),
+    "gust_sim_state": (c_int, (_HANDLE, POINTER(c_double), _NUMBERS, _NUMBERS)),
+    "gust_sim_channels": (c_int, (_HANDLE, _NUMBERS)),
+    "gust_sim_residual": (c_int, (_HANDLE, c_double, _NUMBERS, _NUMBERS, _NUMBERS)),
+    "gust_sim_jacobian": (c_int, (_HANDLE, c_double, _NUMBERS, _NUMBERS, c_double, _NUMBERS)),
+}
+
+
+@cache
+def library() -> ctypes.CDLL:
+    """libgustform.so, loaded once; calls release the GIL."""
+    loaded = ctypes.CDLL(str(library_path()))
+    for name, (result, arguments) in _SIGNATURES.items():
+        function = getattr(loaded, name)
+        function.restype = result
+        function.argtypes = arguments
+    return loaded

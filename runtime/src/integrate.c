@@ -1,0 +1,139 @@
+/* The loop that advances a simulation: steps, events, result rows. */
+#include <float.h>
+#include <math.h>
+
+#include "moment.h"
+#include "simulation.h"
+#include "text.h"
+#include "vector.h"
+
+/* Result rows that are due up to `t`, all within the last step or at its end. */
+static gust_status write_rows(gust_sim *sim, double t)
+{
+    gust_sink *sink = &sim->sink;
+    gust_solver *solver = &sim->solver;
+    const double little = gust_moment_end(t) - t;
+    while (sink->next_time <= t + little) {
+        const bool at_end = fabs(sink->next_time - solver->t) <= little;
+        N_Vector y = at_end ? solver->y : solver->dense_y;
+        N_Vector yp = at_end ? solver->yp : solver->dense_yp;
+        if (!at_end && !gust_solver_dense(solver, sink->next_time, sink->derivatives)) {
+            gust_text(sim->message, sizeof sim->message, "no values for the result row at t = %.9g s",
+                      sink->next_time);
+            return GUST_SOLVER_FAILED;
+        }
+        const gust_status status = gust_sink_add(sink, &sim->system, gust_vector_data(y), gust_vector_data(yp));
+        if (status != GUST_OK) {
+            gust_text(sim->message, sizeof sim->message, "at t = %.9g s: %s", t,
+                      status < 0 && sim->system.series.failure == status ? sim->system.series.message
+                                                                         : gust_status_text(status));
+            return status;
+        }
+    }
+    return GUST_OK;
+}
+
+static double next_event(const gust_sim *sim)
+{
+    return fmin(gust_sampler_next(&sim->sampler), gust_series_next(&sim->system.series));
+}
+
+/* Step for the first step after an event at t (the integrator itself would guess from y' alone). */
+static double first_step(gust_sim *sim, double t, double until)
+{
+    const double next = fmin(next_event(sim), sim->system.series.end);
+    double longest = 0.01 * (until - t);
+    longest = next > t && next - t < longest ? next - t : longest;
+    longest = longest > 0.0 ? longest : 1e-3;
+    const double estimate = gust_initial_step(&sim->initial, t, gust_vector_data(sim->solver.y),
+                                              gust_vector_data(sim->solver.yp), longest);
+    const double step = sim->options.first_step > 0.0 ? fmin(sim->options.first_step, longest) : estimate;
+    /* Below this the integrator could not tell t + h from t. */
+    return fmax(step, 1e3 * DBL_EPSILON * fmax(fabs(t), 1e-3));
+}
+
+static gust_status handle_event(gust_sim *sim, double until)
+{
+    gust_solver *solver = &sim->solver;
+    bool changed = false;
+    const gust_status status = gust_events_handle(
+        &sim->events, &sim->system, &sim->sampler, &sim->initial, &sim->options, solver->t, sim->root_found,
+        gust_vector_data(solver->y), gust_vector_data(solver->yp), &changed, sim->message, sizeof sim->message);
+    sim->pending = false;
+    sim->root_found = false;
+    if (status == GUST_NOT_CONSISTENT || status == GUST_SINGULAR || status == GUST_NOT_FINITE) {
+        return GUST_RESTART_FAILED;
+    }
+    if (status != GUST_OK || !changed) {
+        return status;
+    }
+    return gust_solver_restart(solver, solver->t, first_step(sim, solver->t, until), sim->message,
+                               sizeof sim->message);
+}
+
+static gust_status end_of_data(gust_sim *sim)
+{
+    const gust_series_set *set = &sim->system.series;
+    gust_text(sim->message, sizeof sim->message,
+              "series \"%s\" ends at %.9g s: the simulation stops there; extend it, or give it on_end: hold or "
+              "repeat",
+              set->series[set->ending].what->name, set->end);
+    return GUST_END_OF_DATA;
+}
+
+static void reach(gust_sim *sim, double t)
+{
+    sim->reached = t;
+    atomic_store_explicit(&sim->time, t, memory_order_relaxed);
+}
+
+gust_status gust_integrate(gust_sim *sim, double until)
+{
+    gust_solver *solver = &sim->solver;
+    gust_series_set *series = &sim->system.series;
+    for (;;) {
+        /* Data may have ended within the last step, if nobody knew before where they end. */
+        const double valid = fmin(solver->t, series->end);
+        const double now = fmin(valid, until);
+        gust_status status = write_rows(sim, now);
+        reach(sim, now);
+        if (status != GUST_OK) {
+            return status;
+        }
+        if (now >= until) {
+            return GUST_OK;
+        }
+        if (now >= series->end) {
+            return end_of_data(sim);
+        }
+        if (atomic_load_explicit(&sim->stop, memory_order_relaxed) != 0) {
+            gust_text(sim->message, sizeof sim->message, "stopped at t = %.9g s on request", now);
+            return GUST_STOP_REQUESTED;
+        }
+        double event = next_event(sim);
+        if (sim->pending || event <= gust_moment_end(solver->t)) {
+            status = handle_event(sim, until);
+            if (status != GUST_OK) {
+                return status;
+            }
+            event = next_event(sim);
+            if (event <= gust_moment_end(solver->t)) {
+                continue;
+            }
+        }
+        switch (
+            gust_solver_step(solver, fmin(event, series->end), &status, sim->message, sizeof sim->message)) {
+        case GUST_STEP_TAKEN:
+            break;
+        case GUST_STEP_AT_STOP:
+            sim->pending = solver->t < series->end;
+            break;
+        case GUST_STEP_AT_ROOT:
+            sim->pending = true;
+            sim->root_found = true;
+            break;
+        case GUST_STEP_FAILED:
+            return status;
+        }
+    }
+}

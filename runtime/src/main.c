@@ -1,0 +1,279 @@
+/* gust-run: runs a built model without Python; result rows as CSV, statistics on stderr. */
+#define _POSIX_C_SOURCE 200809L
+
+#include <errno.h>
+#include <math.h>
+#include <signal.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "gustform/gust_sim.h"
+
+enum { EXIT_RUN = 1, EXIT_USAGE = 2, EXIT_INTERRUPTED = 130, BLOCK_ROWS = 256 };
+
+typedef struct arguments {
+    const char *model;
+    const char *out; /* NULL: standard output */
+    double start;
+    double until;
+    double every;
+    bool has_until;
+    bool quiet;
+} arguments;
+
+typedef struct csv {
+    FILE *file;
+    int32_t n_channels;
+} csv;
+
+/* The simulation that an interrupt stops; set before the handler is installed. */
+static gust_sim *running;
+
+static void on_interrupt(int number)
+{
+    (void)number;
+    gust_sim_request_stop(running);
+}
+
+static void print_usage(FILE *to)
+{
+    fputs("usage: gust-run MODEL.gust --until SECONDS [--every SECONDS] [--start SECONDS] [--out FILE.csv] "
+          "[--quiet]\n"
+          "                [--OPTION VALUE ...]\n"
+          "Runs a built model and writes its channels as CSV, to standard output unless --out names a file.\n"
+          "  --until   simulated time at which to stop, s\n"
+          "  --every   interval of result rows, s (default: a thousandth of the run)\n"
+          "  --start   simulated time at which to start, s (default 0)\n"
+          "  --quiet   no statistics on standard error\n"
+          "Options of the integrator:\n",
+          to);
+    for (int i = 0; gust_option_list(i) != NULL; ++i) {
+        const gust_option_info *option = gust_option_list(i);
+        fprintf(to, "  --%-22s %s (default %g)\n", option->name, option->sentence, option->initial);
+    }
+    fputs(
+        "Exit codes: 0 done, 1 model or run error, 2 usage, 130 interrupted (what was computed is written).\n",
+        to);
+}
+
+static bool read_number(const char *name, const char *text, double *value)
+{
+    char *end = NULL;
+    errno = 0;
+    *value = text != NULL ? strtod(text, &end) : 0.0;
+    if (text == NULL || end == text || *end != '\0' || errno == ERANGE || !isfinite(*value)) {
+        fprintf(stderr, "gust-run: %s needs a number; got %s\n", name, text != NULL ? text : "nothing");
+        return false;
+    }
+    return true;
+}
+
+/* The arguments that are not options of the integrator; those follow in apply_options. */
+static bool read_arguments(int argc, char **argv, arguments *given)
+{
+    for (int i = 1; i < argc; ++i) {
+        const char *name = argv[i];
+        const char *value = i + 1 < argc ? argv[i + 1] : NULL;
+        if (strncmp(name, "--", 2) != 0) {
+            if (given->model != NULL) {
+                fprintf(stderr, "gust-run: one model at a time; got %s and %s\n", given->model, name);
+                return false;
+            }
+            given->model = name;
+            continue;
+        }
+        if (strcmp(name, "--quiet") == 0) {
+            given->quiet = true;
+            continue;
+        }
+        ++i;
+        bool good = true;
+        double ignored = 0.0;
+        if (strcmp(name, "--until") == 0) {
+            good = read_number(name, value, &given->until);
+            given->has_until = true;
+        } else if (strcmp(name, "--every") == 0) {
+            good = read_number(name, value, &given->every);
+            if (good && !(given->every > 0.0)) {
+                fprintf(stderr, "gust-run: --every must be greater than 0 s; got %s\n", value);
+                good = false;
+            }
+        } else if (strcmp(name, "--start") == 0) {
+            good = read_number(name, value, &given->start);
+        } else if (strcmp(name, "--out") == 0) {
+            given->out = value;
+            good = value != NULL;
+            if (!good) {
+                fputs("gust-run: --out needs a file name\n", stderr);
+            }
+        } else {
+            good = read_number(name, value, &ignored);
+        }
+        if (!good) {
+            return false;
+        }
+    }
+    if (given->model == NULL || !given->has_until) {
+        fputs("gust-run: a model file and --until are needed\n", stderr);
+        return false;
+    }
+    if (!(given->until > given->start)) {
+        fprintf(stderr, "gust-run: --until (%g s) must be after --start (%g s)\n", given->until, given->start);
+        return false;
+    }
+    return true;
+}
+
+static bool is_own(const char *name)
+{
+    static const char *const OWN[] = {"--until", "--every", "--start", "--out"};
+    for (size_t k = 0; k < sizeof OWN / sizeof OWN[0]; ++k) {
+        if (strcmp(name, OWN[k]) == 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static bool apply_options(int argc, char **argv, gust_sim *sim)
+{
+    for (int i = 1; i < argc; ++i) {
+        if (strncmp(argv[i], "--", 2) != 0 || strcmp(argv[i], "--quiet") == 0) {
+            continue;
+        }
+        const char *name = argv[i++];
+        double value = 0.0;
+        if (is_own(name)) {
+            continue;
+        }
+        if (!read_number(name, argv[i], &value) || gust_sim_set_option(sim, name + 2, value) != GUST_OK) {
+            fprintf(stderr, "gust-run: %s\n", gust_sim_message(sim));
+            return false;
+        }
+    }
+    return true;
+}
+
+/* A field in double quotes, with quotes inside it doubled. */
+static void write_quoted(FILE *file, const char *name, const char *unit)
+{
+    fputc('"', file);
+    for (const char *c = name; *c != '\0'; ++c) {
+        if (*c == '"') {
+            fputc('"', file);
+        }
+        fputc(*c, file);
+    }
+    fprintf(file, " [%s]\"", unit);
+}
+
+static int write_rows(void *context, int64_t rows, const double *time, const float *values)
+{
+    csv *to = context;
+    for (int64_t r = 0; r < rows; ++r) {
+        fprintf(to->file, "%.9g", time[r]);
+        for (int32_t k = 0; k < to->n_channels; ++k) {
+            fprintf(to->file, ",%.7g", (double)values[r * to->n_channels + k]);
+        }
+        fputc('\n', to->file);
+    }
+    return fflush(to->file) == 0 && !ferror(to->file) ? 0 : -1;
+}
+
+static void print_statistics(const gust_sim *sim, double seconds)
+{
+    gust_statistics s;
+    gust_sim_statistics(sim, &s);
+    fprintf(
+        stderr,
+        "reached t = %.9g s in %.3f s: %lld steps, %lld residuals, %lld Jacobians, %lld + %lld factorisations, "
+        "%lld error test failures, %lld convergence failures, %lld events, %lld restarts, %lld rows\n",
+        gust_sim_time(sim), seconds, (long long)s.steps, (long long)s.residual_evaluations,
+        (long long)s.jacobian_evaluations, (long long)s.factorisations, (long long)s.refactorisations,
+        (long long)s.error_test_failures, (long long)s.nonlinear_failures, (long long)s.events,
+        (long long)s.restarts, (long long)s.rows);
+}
+
+static double seconds_between(const struct timespec *from, const struct timespec *to)
+{
+    return (double)(to->tv_sec - from->tv_sec) + 1e-9 * (double)(to->tv_nsec - from->tv_nsec);
+}
+
+static int run(const arguments *given, const gust_model *model, gust_sim *sim, csv *to)
+{
+    fputs("\"time [s]\"", to->file);
+    for (int32_t k = 0; k < to->n_channels; ++k) {
+        fputc(',', to->file);
+        write_quoted(to->file, gust_model_channel_name(model, k), gust_model_channel_unit(model, k));
+    }
+    fputc('\n', to->file);
+    const double every = given->every > 0.0 ? given->every : (given->until - given->start) / 1000.0;
+    gust_status status = gust_sim_set_sink(sim, every, BLOCK_ROWS, write_rows, to);
+    struct timespec begin;
+    struct timespec end;
+    clock_gettime(CLOCK_MONOTONIC, &begin);
+    if (status == GUST_OK) {
+        status = gust_sim_initialise(sim, given->start);
+    }
+    running = sim;
+    struct sigaction action = {.sa_handler = on_interrupt};
+    sigemptyset(&action.sa_mask);
+    sigaction(SIGINT, &action, NULL);
+    sigaction(SIGTERM, &action, NULL);
+    if (status == GUST_OK) {
+        status = gust_sim_advance(sim, given->until, NULL);
+    }
+    clock_gettime(CLOCK_MONOTONIC, &end);
+    if (!given->quiet) {
+        print_statistics(sim, seconds_between(&begin, &end));
+    }
+    if (status == GUST_OK) {
+        return EXIT_SUCCESS;
+    }
+    fprintf(stderr, "gust-run: %s: %s\n", gust_status_name(status), gust_sim_message(sim));
+    return status == GUST_STOP_REQUESTED ? EXIT_INTERRUPTED : EXIT_RUN;
+}
+
+int main(int argc, char **argv)
+{
+    if (argc > 1 && (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0)) {
+        print_usage(stdout);
+        return EXIT_SUCCESS;
+    }
+    arguments given = {0};
+    if (!read_arguments(argc, argv, &given)) {
+        print_usage(stderr);
+        return EXIT_USAGE;
+    }
+    char message[2048];
+    gust_model *model = NULL;
+    if (gust_model_load(given.model, &model, message, sizeof message) != GUST_OK) {
+        fprintf(stderr, "gust-run: %s: %s\n", given.model, message);
+        return EXIT_RUN;
+    }
+    int code = EXIT_RUN;
+    gust_sim *sim = NULL;
+    csv to = {stdout, gust_model_n_channels(model)};
+    if (gust_sim_create(model, &sim) != GUST_OK) {
+        fputs("gust-run: out of memory\n", stderr);
+    } else if (!apply_options(argc, argv, sim)) {
+        code = EXIT_USAGE;
+    } else {
+        to.file = given.out != NULL ? fopen(given.out, "w") : stdout;
+        if (to.file == NULL) {
+            fprintf(stderr, "gust-run: %s cannot be written: %s\n", given.out, strerror(errno));
+        } else {
+            code = run(&given, model, sim, &to);
+        }
+    }
+    if (given.out != NULL && to.file != NULL && to.file != stdout && fclose(to.file) != 0) {
+        fprintf(stderr, "gust-run: %s could not be written: %s\n", given.out, strerror(errno));
+        code = EXIT_RUN;
+    }
+    gust_sim_destroy(&sim);
+    gust_model_destroy(&model);
+    return code;
+}

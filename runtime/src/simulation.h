@@ -1,0 +1,45 @@
+/* What a simulation consists of. */
+#ifndef GUSTFORM_SIMULATION_H
+#define GUSTFORM_SIMULATION_H
+
+#include <stdatomic.h>
+#include <stdbool.h>
+
+#include "events.h"
+#include "gustform/gust_sim.h"
+#include "initial.h"
+#include "options.h"
+#include "sampler.h"
+#include "sink.h"
+#include "solver.h"
+#include "system.h"
+
+typedef enum gust_phase {
+    GUST_PHASE_CREATED, /* options and callbacks may be set */
+    GUST_PHASE_READY,   /* initialised: may be advanced */
+    GUST_PHASE_ENDED    /* stopped for good: advancing gives the same status again */
+} gust_phase;
+
+struct gust_sim {
+    const gust_model *model;
+    gust_phase phase;
+    gust_status ended_with;
+    gust_options options;
+    gust_system system;
+    gust_sampler sampler;
+    gust_events events;
+    gust_solver solver;
+    gust_initial initial;
+    gust_sink sink;
+    bool pending;        /* the integrator stands at an event that has not been handled */
+    bool root_found;     /* and it is a zero crossing */
+    double reached;      /* time that advance() has reached, s; the integrator may be a step ahead */
+    _Atomic double time; /* the same, for other threads */
+    atomic_int stop;     /* set by gust_sim_request_stop */
+    char message[4096];
+};
+
+/* The loop of gust_sim_advance, without hand-over of the last block. */
+gust_status gust_integrate(gust_sim *sim, double until);
+
+#endif
