@@ -60,8 +60,10 @@ def _kept(system: System, wired: dict[str, frozenset[str]]) -> dict[str, frozens
         path, sign = unit.aliases.get(rest, (rest, 1))
         if any(u.path == path for u in unit.unknowns) and sign > 0:
             continue
-        if not any(r.path == path for r in unit.recorded):
-            known = [u.path for u in unit.unknowns] + [r.path for r in unit.recorded]
+        if rest in unit.aliases:
+            path = rest
+        elif not any(r.path == path for r in unit.recorded):
+            known = [u.path for u in unit.unknowns] + [r.path for r in unit.recorded] + list(unit.aliases)
             raise GustformError(
                 "GF3007", f"{target} reads {source}, which {name} does not have", hint=suggest(rest, known)
             )

@@ -5,10 +5,12 @@ from __future__ import annotations
 import hashlib
 import os
 import platform
+import tempfile
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 
+from gustform.language.errors import GustformError
 from gustform_codegen import toolchain
 
 
@@ -46,9 +48,35 @@ class KernelCache:
         return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
 
     def get(self, source: str, type_name: str) -> Path:
-        """The shared library for a kernel's C text, compiled if it is not there yet."""
+        """The shared library for a kernel's C text, compiled if it is not there whole. GF4003 without a folder."""
         path = self.folder / "kernels" / f"{self.key(source)}.so"
-        if not path.exists():
-            toolchain.compile_kernel(source, path, self.include, type_name)
+        if not _intact(path):
+            try:
+                toolchain.compile_kernel(source, path, self.include, type_name)
+                _seal(path)
+            except OSError as failure:
+                raise GustformError(
+                    "GF4003",
+                    f"compiled kernels cannot be kept in {path.parent}: {failure}",
+                    hint="GUSTFORM_CACHE=/a/folder/to/write/to",
+                ) from failure
             self.compilations += 1
         return path
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _seal(path: Path) -> None:
+    """Write down what a whole library hashes to: a file cut off by a crash must not be loaded."""
+    with tempfile.NamedTemporaryFile("w", dir=path.parent, delete=False) as file:
+        file.write(_digest(path))
+    Path(file.name).replace(path.with_suffix(".sha256"))
+
+
+def _intact(path: Path) -> bool:
+    try:
+        return path.with_suffix(".sha256").read_text(encoding="ascii", errors="replace") == _digest(path)
+    except OSError:
+        return False

@@ -63,6 +63,8 @@ def unpack(data: bytes) -> Sections:
 
     if data[:8] != MAGIC:
         raise refuse(f"it begins with {data[:8]!r}")
+    if len(data) < 16:
+        raise refuse("its header is cut off")
     version, count = struct.unpack_from("<II", data, 8)
     if version != VERSION:
         raise refuse(f"version {version}, this program reads {VERSION}")
@@ -73,5 +75,9 @@ def unpack(data: bytes) -> Sections:
         name, code, _, size, offset = _ENTRY.unpack_from(data, 16 + k * _ENTRY.size)
         if code not in _DTYPES or offset + size * _DTYPES[code].itemsize > len(data):
             raise refuse(f"section {k} lies outside the file")
-        sections[name.rstrip(b"\0").decode()] = np.frombuffer(data, dtype=_DTYPES[code], count=size, offset=offset)
+        try:
+            label = name.rstrip(b"\0").decode()
+        except UnicodeDecodeError:
+            raise refuse(f"the name of section {k} is not text") from None
+        sections[label] = np.frombuffer(data, dtype=_DTYPES[code], count=size, offset=offset)
     return sections

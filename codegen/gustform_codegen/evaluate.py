@@ -6,23 +6,32 @@ kernels with CasADi.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from gustform.language.table import evaluate_spline
 from gustform_codegen.emit.kernel import pattern_and_jacobian
 from gustform_codegen.unit_type import UnitType
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.int32]
 
 
 class TypeEvaluator:
-    """Residual rows, flows and initial equations of one type, with derivatives; arguments are (n, instances)."""
+    """Residual rows, flows and initial equations of one type, with derivatives; arguments are (n, instances).
 
-    def __init__(self, unit: UnitType) -> None:
+    `table` holds the number of each instance's tables (instances, tables) among `splines`; both are data of the
+    instances, not of the type.
+    """
+
+    def __init__(self, unit: UnitType, table: Ints | None = None, splines: Sequence[dict[str, Any]] = ()) -> None:
         self.unit = unit
+        self.table = table
+        self.splines = splines
         self.y = ca.SX.sym("y", 0) if not unit.unknowns else ca.vertcat(*[u.symbol for u in unit.unknowns])
         self.yp = ca.vertcat(*[u.der if u.der is not None else ca.SX.sym("no_der") for u in unit.unknowns])
         self.w = ca.vertcat(*[x.symbol for x in unit.externals])
@@ -52,9 +61,11 @@ class TypeEvaluator:
         values = np.zeros((3 * len(self.unit.calls), n))
         for k, call in enumerate(self.unit.calls):
             x, y = self._evaluate(self._call_arguments[k], [*arguments, values])
-            reference = self.unit.tables[call.table]
-            data = self.unit.component.at(reference.owner.path).table(reference.declaration.name)
-            values[3 * k : 3 * k + 3] = data.evaluate(x[0], y[0])
+            assert self.table is not None
+            numbers = self.table[:, call.table]
+            for number in np.unique(numbers):
+                some = np.flatnonzero(numbers == number)
+                values[3 * k : 3 * k + 3, some] = evaluate_spline(self.splines[number], x[0, some], y[0, some])
         return values
 
     @staticmethod

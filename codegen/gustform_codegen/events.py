@@ -10,6 +10,7 @@ from gustform.language.errors import GustformError, Place
 from gustform_codegen.unit_type import Root
 
 _COMPARISONS = (ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE)
+_JUMPS = (ca.OP_SIGN, ca.OP_FLOOR, ca.OP_CEIL, ca.OP_FMOD)
 
 
 def indicator(condition: Any, text: str) -> Any:
@@ -49,12 +50,14 @@ def _nodes(expression: Any) -> list[Any]:
 
 
 def refuse_bare_comparisons(expression: Any, text: str, place: Place | None) -> None:
-    """GF1018 if an equation contains a comparison: it would jump without the solver knowing."""
+    """GF1018 if an equation contains a comparison or a function with steps: it would jump without the solver
+    knowing."""
     for node in _nodes(expression):
-        if any(node.is_op(op) for op in _COMPARISONS):
+        comparison = any(node.is_op(op) for op in _COMPARISONS)
+        if comparison or any(node.is_op(op) for op in _JUMPS):
             raise GustformError(
                 "GF1018",
-                f"a bare comparison ({node}) in {text}",
+                f"a {'bare comparison' if comparison else 'function with steps'} ({node}) in {text}",
                 hint="limit(), maximum() or minimum(), or a Discrete that a when-clause sets",
                 place=place,
             )

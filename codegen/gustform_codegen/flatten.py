@@ -15,7 +15,7 @@ import casadi as ca
 
 from gustform.language.component import Component
 from gustform.language.errors import GustformError, Place
-from gustform.language.operators import constants, table_calls
+from gustform.language.operators import TableCall, constants, table_calls
 from gustform.language.scope import Elaborated, Symbol, elaborate
 from gustform.language.unitcheck import check_units
 from gustform_codegen.alias import AliasSets, as_alias
@@ -42,12 +42,11 @@ _MAX_LINEAR_BLOCK = 3
 
 @dataclass(frozen=True)
 class _Statement:
-    """One equation of the flat system: expression = 0. `call` is set for value = table(x, y)."""
+    """One equation of the flat system: expression = 0."""
 
     expression: Any
     text: str
     place: Place | None
-    call: Any = None
 
 
 class _Flattener:
@@ -98,7 +97,7 @@ class _Flattener:
             s = symbols[key]
             if not self.is_unknown(s):
                 return 3
-            if key in ders or s.path in self.keep:
+            if key in ders:
                 return 2
             return 1 if s.kind in ("variable", "output") else 0
 
@@ -109,7 +108,12 @@ class _Flattener:
             if pair is not None:
                 a, b, sign = pair
                 ka, kb = key_of(a), key_of(b)
-                mergeable = all(k in symbols and symbols[k].kind not in ("parameter", "discrete") for k in (ka, kb))
+                mergeable = all(
+                    k in symbols
+                    and symbols[k].kind not in ("parameter", "discrete")
+                    and symbols[k].path not in self.keep
+                    for k in (ka, kb)
+                )
                 external_state = (
                     any(
                         rank(x) == 3 and sets.find(y)[0] in ders
@@ -151,20 +155,8 @@ class _Flattener:
 
     def solve(self, statements: list[_Statement], declared_equations: int) -> UnitType:
         symbols, ders = self.e.symbols, self.e.derivatives
-        # Table values are unknowns that their own statement defines.
-        calls_used: dict[int, Any] = {}
-        pending = [s.expression for s in statements] + [self.prepared(x) for x in self._when_expressions()]
-        while pending:
-            for key in keys_in(pending.pop()):
-                if key in table_calls and key not in calls_used:
-                    call = table_calls[key]
-                    calls_used[key] = (call, self.prepared(call.x), self.prepared(call.y))
-                    pending += calls_used[key][1:]
-        statements = statements + [
-            _Statement(call.symbol - (x + y), f"table {call.table.name}", None, (call, x, y))
-            for call, x, y in calls_used.values()
-        ]
-        # Unknowns: algebraic variables and table values by their symbol, states by their derivative.
+        self.find_calls([s.expression for s in statements] + [self.prepared(x) for x in self._other_expressions()])
+        # Unknowns: algebraic variables by their symbol, states by their derivative.
         unknown_symbols: list[Any] = []
         labels: list[str] = []
         for key, s in symbols.items():
@@ -172,9 +164,6 @@ class _Flattener:
                 continue
             unknown_symbols.append(ders[key] if key in self.states else s.symbol)
             labels.append(f"der({s.path})" if key in self.states else s.path)
-        for call, _, _ in calls_used.values():
-            unknown_symbols.append(call.symbol)
-            labels.append(f"table value {call.symbol}")
         index = {key_of(s): k for k, s in enumerate(unknown_symbols)}
         n_own = len(unknown_symbols)
         externals = [(key, s) for key, s in symbols.items() if self.is_external(s)]
@@ -184,9 +173,7 @@ class _Flattener:
         incidence: list[frozenset[int]] = []
         with_external: list[frozenset[int]] = []
         for statement in statements:
-            used = keys_in(statement.expression)
-            if statement.call is not None:
-                used = [key_of(statement.call[0].symbol), *keys_in(statement.call[1]), *keys_in(statement.call[2])]
+            used = {*keys_in(statement.expression), *self.through_tables(statement.expression)}
             incidence.append(frozenset(index[k] for k in used if k in index))
             with_external.append(incidence[-1] | {external_index[k] for k in used if k in external_index})
         check_balance(self.name, texts, labels, incidence)
@@ -201,12 +188,10 @@ class _Flattener:
             left_over = [e for e, z in enumerate(full.unknown_of) if z >= n_own]
             iterate = {z for z in range(n_own) if full.equation_of[z] < 0}
             matching = full
-        keep = {k for k, label in enumerate(labels) if label in self.keep}
 
         solution = Substitution()
         rows: list[Row] = []
         torn: list[int] = sorted(iterate)
-        calls: list[Call] = []
         inner = [frozenset(z for z in row if z not in iterate) for row in incidence]
         trimmed = Matching(
             [z if z < n_own and e not in set(left_over) else -1 for e, z in enumerate(matching.unknown_of)],
@@ -221,12 +206,60 @@ class _Flattener:
                 unknown_symbols,
                 solution,
                 rows,
-                calls,
-                keep,
             )
         for e in left_over:
             rows.append(Row(solution.one(statements[e].expression), statements[e].text))
-        return self.collect(rows, torn, unknown_symbols, solution, calls, externals, declared_equations, statements)
+        return self.collect(rows, torn, unknown_symbols, solution, externals, declared_equations, statements)
+
+    # ---- table look-ups: functions of their arguments, never unknowns themselves ----
+    def find_calls(self, expressions: Iterable[Any]) -> None:
+        """Keep in `calls` the look-ups that expressions need, with their arguments."""
+        self.calls: dict[int, tuple[TableCall, Any, Any]] = {}
+        pending = list(expressions)
+        while pending:
+            for key in keys_in(pending.pop()):
+                if key in table_calls and key not in self.calls:
+                    call = table_calls[key]
+                    self.calls[key] = (call, self.prepared(call.x), self.prepared(call.y))
+                    text = f"the arguments of table {call.table.name}"
+                    for argument in self.calls[key][1:]:
+                        refuse_bare_comparisons(argument, text, None)
+                        pending.append(argument)
+
+    def through_tables(self, expression: Any, *known: Substitution) -> set[int]:
+        """The symbols that an expression depends on through table look-ups, `known` ones replaced."""
+        result: set[int] = set()
+        pending = [key for key in keys_in(expression) if key in self.calls]
+        seen = set(pending)
+        while pending:
+            arguments = list(self.calls[pending.pop()][1:])
+            for substitution in known:
+                arguments = substitution.apply(arguments)
+            for key in (key for argument in arguments for key in keys_in(argument)):
+                result.add(key)
+                if key in self.calls and key not in seen:
+                    seen.add(key)
+                    pending.append(key)
+        return result
+
+    def final_calls(self, solution: Substitution) -> list[Call]:
+        """The look-ups in an order in which they can be evaluated, their arguments in terms of what is known."""
+        arguments = {key: solution.apply([x, y]) for key, (_, x, y) in self.calls.items()}
+        ordered: dict[int, Call] = {}
+
+        def place(key: int) -> None:
+            for inner in (k for argument in arguments[key] for k in keys_in(argument)):
+                if inner in arguments and inner not in ordered:
+                    place(inner)
+            call = self.calls[key][0]
+            slopes = [ca.SX.sym(f"{call.symbol}/d{axis}") for axis in "xy"]
+            number = self.table_index[(id(call.table), call.owner.path)]
+            ordered[key] = Call(call.symbol, slopes[0], slopes[1], number, *arguments[key])
+
+        for key in arguments:
+            if key not in ordered:
+                place(key)
+        return list(ordered.values())
 
     def solve_block(
         self,
@@ -236,45 +269,32 @@ class _Flattener:
         symbols: list[Any],
         solution: Substitution,
         rows: list[Row],
-        calls: list[Call],
-        keep: set[int],
     ) -> list[int]:
-        """Solve one block as far as symbols reach; append to `solution`, `rows`, `calls`; return what stays unknown."""
+        """Solve one block as far as symbols reach; append to `solution` and `rows`; return what stays unknown."""
         wanted = frozenset(unknowns)
-        local: list[Any] = []
+        local = solution.apply([s.expression for s in statements])
         solvable: list[frozenset[int]] = []
-        for statement, used in zip(statements, incidence, strict=True):
-            if statement.call is not None:
-                call, x, y = statement.call
-                local.append(None)
-                solvable.append(frozenset({z for z in used & wanted if key_of(symbols[z]) == key_of(call.symbol)}))
-                continue
-            expression = solution.one(statement.expression)
-            local.append(expression)
+        for expression, used in zip(local, incidence, strict=True):
+            opaque = self.through_tables(expression, solution)
             can = set()
             for z in used & wanted:
                 slope = ca.jacobian(expression, symbols[z])
-                if not ca.depends_on(slope, symbols[z]) and not slope.is_zero() and self.is_constant(slope):
+                explicit = not ca.depends_on(slope, symbols[z]) and not slope.is_zero() and self.is_constant(slope)
+                if explicit and key_of(symbols[z]) not in opaque:
                     can.add(z)
             solvable.append(frozenset(can))
         sequence, tears, residuals = tear(incidence, wanted, solvable)
         block_solution = Substitution()
         assigned: list[tuple[int, Any]] = []
         for e, z in sequence:
-            if statements[e].call is not None:
-                call, x, y = statements[e].call
-                arguments = block_solution.apply(solution.apply([x, y]))
-                slopes = [ca.SX.sym(f"{call.symbol}/d{axis}") for axis in "xy"]
-                number = self.table_index[(id(call.table), call.owner.path)]
-                calls.append(Call(call.symbol, slopes[0], slopes[1], number, arguments[0], arguments[1]))
-                continue
-            expression = block_solution.one(local[e])
-            value = solve_for(expression, symbols[z])
+            value = solve_for(block_solution.one(local[e]), symbols[z])
             block_solution.add(symbols[z], value)
             assigned.append((z, value))
         left = [block_solution.one(local[e]) for e in residuals]
         tear_symbols = [symbols[z] for z in tears]
-        solved = solve_linear(left, tear_symbols) if 0 < len(tears) <= _MAX_LINEAR_BLOCK else None
+        opaque = set[int]().union(*(self.through_tables(e, solution, block_solution) for e in left))
+        exact = 0 < len(tears) <= _MAX_LINEAR_BLOCK and opaque.isdisjoint(key_of(s) for s in tear_symbols)
+        solved = solve_linear(left, tear_symbols) if exact else None
         if solved is not None:
             final = Substitution()
             for symbol, value in zip(tear_symbols, solved, strict=True):
@@ -282,19 +302,12 @@ class _Flattener:
                 solution.add(symbol, value)
             for z, value in assigned:
                 solution.add(symbols[z], final.one(value))
-            self._fix_calls(calls, final)
             tears = []
         else:
             for z, value in assigned:
                 solution.add(symbols[z], value)
             rows += [Row(value, statements[e].text) for value, e in zip(left, residuals, strict=True)]
         return tears
-
-    @staticmethod
-    def _fix_calls(calls: list[Call], final: Substitution) -> None:
-        for k, call in enumerate(calls):
-            x, y = final.apply([call.x, call.y])
-            calls[k] = Call(call.value, call.x_slope, call.y_slope, call.table, x, y)
 
     def is_constant(self, expression: Any) -> bool:
         """Whether it depends on parameters and numbers only, so that it cannot pass through zero during a run."""
@@ -308,7 +321,6 @@ class _Flattener:
         torn: list[int],
         unknown_symbols: list[Any],
         solution: Substitution,
-        calls: list[Call],
         externals: list[tuple[int, Symbol]],
         declared_equations: int,
         statements: list[_Statement],
@@ -347,11 +359,18 @@ class _Flattener:
                 aliases[s.path] = (symbols[target].path, sign)
             elif self.is_unknown(s) and key not in order:
                 recorded.append(Recorded(s.path, self._final(s.symbol, solution), s))
+            elif self.is_input(s) or s.kind == "discrete":
+                recorded.append(Recorded(s.path, s.symbol, s))
         parameters = list(self.e.of_kind("parameter"))
         discretes = list(self.e.of_kind("discrete"))
         roots, whens = self._whens(parameters, discretes, order, by_path, solution)
         final_rows = [Row(r.expression, r.text) for r in [*state_rows, *rows]]
-        roots += bend_roots([(r.expression, r.text) for r in final_rows] + [(f.expression, f.path) for f in flows])
+        calls = self.final_calls(solution)
+        roots += bend_roots(
+            [(r.expression, r.text) for r in final_rows]
+            + [(f.expression, f.path) for f in flows]
+            + [(e, f"table {self.e.tables[c.table].declaration.name}") for c in calls for e in (c.x, c.y)]
+        )
         free = [k for k, p in enumerate(parameters) if p.declaration.free]  # type: ignore[attr-defined]
         initial = [Row(self._final(eq.lhs - eq.rhs, solution), str(eq)) for eq in self.e.initial]
         if len(initial) != len(free):
@@ -379,7 +398,7 @@ class _Flattener:
             whens=whens,
             initial=initial,
             free_parameters=free,
-            substituted=len(recorded),
+            substituted=sum(self.is_unknown(r.declared) for r in recorded),
             declared_equations=declared_equations,
         )
 
@@ -400,7 +419,10 @@ class _Flattener:
         position = list(flow.port._flows).index(name)
         return f"{port}.{list(flow.port._potentials)[position]}"
 
-    def _when_expressions(self) -> Iterable[Any]:
+    def _other_expressions(self) -> Iterable[Any]:
+        """What may use table values apart from the equations: initial equations and when-clauses."""
+        for equation in self.e.initial:
+            yield equation.lhs - equation.rhs
         for when in self.e.whens:
             if when.condition is not None:
                 yield when.condition
@@ -432,10 +454,10 @@ class _Flattener:
                     raise GustformError("GF1015", f"the sample period must be a parameter in {text}")
             reinit = []
             for target, value in when.reinit:
-                symbol = self.alias_substitution.one(target)
-                if not symbol.is_symbolic() or key_of(symbol) not in self.states:
+                key, sign = self.alias.get(key_of(target), (key_of(target), 1))
+                if key not in self.states:
                     raise GustformError("GF1016", f"reinit needs a state; {target} is none in {text}")
-                reinit.append((order[key_of(symbol)], self._final(value, solution)))
+                reinit.append((order[key], sign * self._final(value, solution)))
             assign = [(discrete_index[key_of(t)], self._final(v, solution)) for t, v in when.assign]
             clauses.append(WhenClause(root, period, assign, reinit, text))
         return roots, clauses

@@ -38,7 +38,8 @@ class _Problem:
 
     def __init__(self, linked: Linked) -> None:
         self.linked = linked
-        self.evaluators = [TypeEvaluator(t.unit) for t in linked.types]
+        splines = [lookup.spline for lookup in linked.table.tables]
+        self.evaluators = [TypeEvaluator(t.unit, t.table.table, splines) for t in linked.types]
         n = linked.table.n_unknowns
         self.n = n
         scale: list[float] = list(linked.table.nominal)

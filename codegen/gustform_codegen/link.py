@@ -104,12 +104,9 @@ class Linked:
                             continue
                         channel, sign = resolved
                         key = (channel.kind, channel.a, channel.b)
-                        if path in t.unit.aliases and key in channels:
-                            aliases[full] = (channels[key].name, sign)
-                        elif key not in channels:
-                            channels[key] = channel
-                            if sign < 0:
-                                aliases[full] = (channel.name, sign)
+                        kept = channels.setdefault(key, channel)
+                        if kept.name != full:
+                            aliases[full] = (kept.name, sign)
             if not found:
                 raise GustformError(
                     "GF2011", f"no variable matches {pattern!r}", hint=suggest(pattern, self._some_names())
@@ -178,10 +175,11 @@ def connection_sets(system: System) -> list[_ConnectionSet]:
                     f"{path} is not connected ({connector.description})",
                     hint=f"at: a bus, or a connection of {path}",
                 )
-            if path in degree:
-                groups.setdefault(find(path), []).append(path)
+            # An optional port that nobody uses is a set of its own: its flows sum to zero.
+            groups.setdefault(find(path), []).append(path)
     return [
-        _ConnectionSet(ports, system.port(ports[0]), max(ports, key=lambda p: degree[p])) for ports in groups.values()
+        _ConnectionSet(ports, system.port(ports[0]), max(ports, key=lambda p: degree.get(p, 0)))
+        for ports in groups.values()
     ]
 
 
@@ -210,8 +208,9 @@ def link(system: System, types: list[tuple[UnitType, Kernel, str, list[str]]]) -
             component = system.components[instance]
             connector = component.declared(Connector)[port_name]
             potential = group.connector._potentials[name]
-            start.append(component.number(connector.start.get(name, potential.start)))
-            nominal.append(component.number(connector.nominal.get(name, potential.nominal)))
+            path = f"{port_name}.{name}"
+            start.append(component.number(connector.start.get(name, potential.start), f"{path} (start)"))
+            nominal.append(_nominal(component, connector.nominal.get(name, potential.nominal), path))
             shared_names.append(f"{group.hub}.{name}")
     total = n + len(shared_names)
 
@@ -248,7 +247,7 @@ def link(system: System, types: list[tuple[UnitType, Kernel, str, list[str]]]) -
                 by_path = component.parameter_values()
                 values[id(component)] = (
                     [by_path[p.path] for p in unit.parameters],
-                    [component.at(d.owner.path).number(d.declaration.start) for d in unit.discretes],  # type: ignore[attr-defined]
+                    [component.at(d.owner.path).start_value(d.declaration) for d in unit.discretes],  # type: ignore[arg-type]
                 )
             parameters[k], discrete[k] = values[id(component)]
         table = TypeTable(
@@ -310,6 +309,16 @@ def link(system: System, types: list[tuple[UnitType, Kernel, str, list[str]]]) -
     return answer
 
 
+def _nominal(owner: Component, declared: Any, label: str) -> float:
+    value = owner.number(declared, f"{label} (nominal)")
+    if value <= 0:
+        path = f"{owner.path}.{label}" if owner.path else label
+        raise GustformError(
+            "GF2003", f"{type(owner).__name__}: nominal of {path} must be greater than 0; got {value:g}"
+        )
+    return value
+
+
 def _start_values(t: LinkedType) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
     start = np.zeros((len(t.names), len(t.unit.unknowns)))
     nominal = np.ones_like(start)
@@ -322,10 +331,12 @@ def _start_values(t: LinkedType) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, 
                 name = u.path.rpartition(".")[2]
                 port = s.port
                 declared: Any = s.declaration
-                starts.append(
-                    owner.number(port.start.get(name, getattr(declared, "start", 0.0)) if port else declared.start)
-                )
-                nominals.append(owner.number(port.nominal.get(name, declared.nominal) if port else declared.nominal))
+                if port is None:
+                    starts.append(owner.start_value(declared))
+                    nominals.append(_nominal(owner, declared.nominal, name))
+                    continue
+                starts.append(owner.number(port.start.get(name, getattr(declared, "start", 0.0)), f"{name} (start)"))
+                nominals.append(_nominal(owner, port.nominal.get(name, declared.nominal), name))
             cache[id(component)] = (starts, nominals)
         start[k], nominal[k] = cache[id(component)]
     return start, nominal
@@ -433,7 +444,8 @@ def _schedule(
         for j, p in enumerate(parameters):
             declared = p.declaration
             assert isinstance(declared, Parameter)
-            if after[p.path] != before[p.path] and not declared.free:
+            # What a change sets is set, also a free parameter, whose value before is known only at the start.
+            if p.path == rest or (after[p.path] != before[p.path] and not declared.free):
                 result.append((change.at, (number, k, j), after[p.path]))
     return result
 

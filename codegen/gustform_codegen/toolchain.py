@@ -26,12 +26,15 @@ class Compiler:
     version: str
 
 
-@lru_cache(maxsize=1)
 def find_compiler() -> Compiler:
-    """$CC, else cc, gcc or clang. GF4001 when there is none."""
-    wanted = os.environ.get("CC")
+    """$CC, else cc, gcc or clang. GF4001 when there is none, GF4002 when $CC cannot say its version."""
+    return _find(os.environ.get("CC"), os.environ.get("PATH"))
+
+
+@lru_cache
+def _find(wanted: str | None, search: str | None) -> Compiler:
     for name in [wanted] if wanted else ["cc", "gcc", "clang"]:
-        path = shutil.which(name)
+        path = shutil.which(name, path=search)
         if path is None:
             continue
         try:
@@ -42,6 +45,11 @@ def find_compiler() -> Compiler:
             continue
         if answer.returncode == 0:
             return Compiler(path, answer.stdout.splitlines()[0] if answer.stdout else path)
+        if wanted:
+            words = (answer.stderr or answer.stdout or f"exit code {answer.returncode}").strip().splitlines()
+            raise GustformError(
+                "GF4002", f"the C compiler {path} failed on --version: {' | '.join(words[:3])}", hint="CC=gcc"
+            )
     looked = f"$CC={wanted!r}" if wanted else "cc, gcc and clang on the PATH"
     raise GustformError(
         "GF4001", f"no C compiler: looked for {looked}", hint="apt-get install build-essential, or CC=/path/to/cc"

@@ -12,6 +12,8 @@ from typing import Any
 
 import casadi as ca
 
+from gustform.language.errors import GustformError
+
 _INFIX = {
     ca.OP_ADD: "+",
     ca.OP_SUB: "-",
@@ -77,7 +79,11 @@ def _c_expression(op: int, a: Sequence[str]) -> str:
         return f"({a[0]} > 0.0) ? 1.0 : (({a[0]} < 0.0) ? -1.0 : {a[0]})"
     if op == ca.OP_IF_ELSE_ZERO:
         return f"({a[0]} != 0.0) ? {a[1]} : 0.0"
-    raise NotImplementedError(f"CasADi operation {op} has no C form here")
+    raise GustformError(
+        "GF4004",
+        f"a function in the equations (CasADi operation {op}) has no C form here",
+        hint="sin, cos, exp, log, sqrt, ... and the operators of gustform.language",
+    )
 
 
 class Hoister:

@@ -8,7 +8,10 @@ the same attributes are CasADi symbols, and collects the equations.
 from __future__ import annotations
 
 import difflib
+import itertools
 import linecache
+import math
+import re
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -16,7 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from gustform.language.connector import Connector
-from gustform.language.declare import Declaration, Discrete, Parameter, Part, Table, Variable
+from gustform.language.declare import Declaration, Discrete, Input, Parameter, Part, Table, Variable
 from gustform.language.errors import GustformError
 from gustform.language.table import TableData
 
@@ -29,7 +32,9 @@ AnyDeclaration = Declaration | Part | Connector
 def suggest(name: str, known: list[str]) -> str:
     """One thing to try for a name that is not known: the nearest one, or the list."""
     near = difflib.get_close_matches(name, known, n=1)
-    return near[0] if near else ("one of " + ", ".join(known) if known else "nothing: it takes none")
+    if near or not known:
+        return near[0] if near else "nothing: it takes none"
+    return "one of " + ", ".join(known[:10]) + (", ..." if len(known) > 10 else "")
 
 
 @dataclass(frozen=True)
@@ -44,23 +49,32 @@ class Source:
         return f"{self.text} ({Path(self.file).name}:{self.line})"
 
 
-def _equation_text(call: str) -> str:
+def _equation_text(call: str, joiner: str) -> str:
     """ "C * der(v) = i" from the arguments of "self.eq(self.C * self.der(self.v), self.i)"."""
+    call = " ".join(call.split()).removesuffix(",")
     depth = 0
     for position, character in enumerate(call):
         depth += (character in "([{") - (character in ")]}")
         if character == "," and depth == 0:
-            call = call[:position] + " =" + call[position + 1 :]
+            call = call[:position] + joiner + call[position + 1 :].lstrip()
             break
-    return call.replace("self.", "").replace("ca.", "")
+    return re.sub(r"\b(self|ca)\.", "", call)
 
 
-def _caller() -> Source:
+def _caller(joiner: str = " = ") -> Source:
+    """Where the statement two frames up was written, with its text, which may run over several lines."""
     frame = sys._getframe(2)
     file, line = frame.f_code.co_filename, frame.f_lineno
-    text = linecache.getline(file, line).strip()
-    start, end = text.find("(") + 1, text.rfind(")")
-    return Source(file, line, _equation_text(text[start:end] if 0 < start < end else text))
+    positions = itertools.islice(frame.f_code.co_positions(), frame.f_lasti // 2, None)
+    first, last, begin, end = next(positions, (None, None, None, None))
+    if first is None or last is None or begin is None or end is None:
+        return Source(file, line, linecache.getline(file, line).strip())
+    # Columns count UTF-8 bytes.
+    lines = [linecache.getline(file, k).encode() for k in range(first, last + 1)]
+    lines[-1] = lines[-1][:end]
+    lines[0] = lines[0][begin:]
+    text = b"".join(lines).decode(errors="replace")
+    return Source(file, line, _equation_text(text[text.find("(") + 1 : text.rfind(")")], joiner))
 
 
 class Component:
@@ -76,12 +90,21 @@ class Component:
         cls._declarations = {
             name: value for name, value in members.items() if isinstance(value, Declaration | Part | Connector)
         }
+        for name in cls._declarations:
+            if hasattr(Component, name):
+                raise GustformError(
+                    "GF1021",
+                    f"{cls.__name__} declares {name!r}, which is a method of every component",
+                    hint=f"{name}_ or another name",
+                )
 
     def __init__(self, **modifiers: Any) -> None:
         declarations = self._declarations
         for name, value in modifiers.items():
             declaration = declarations.get(name)
-            if not isinstance(declaration, Parameter | Part | Table | Variable | Discrete):
+            if isinstance(declaration, Input) or not isinstance(
+                declaration, Parameter | Part | Table | Variable | Discrete
+            ):
                 raise GustformError(
                     "GF1004",
                     f"{type(self).__name__} has no parameter {name!r}",
@@ -223,9 +246,19 @@ class Component:
             modifiers[head] = child.with_value(rest, value)
         return type(self)(**modifiers)
 
-    def number(self, value: float | Callable[[Any], Any]) -> float:
-        """A start, nominal or default as a number."""
-        return float(value(self)) if callable(value) else float(value)
+    def number(self, value: float | Callable[[Any], Any], label: str = "") -> float:
+        """A start or nominal as a number; GF2002 with its label if it is not finite."""
+        result = float(value(self)) if callable(value) else float(value)
+        if not math.isfinite(result):
+            path = f"{self._path}.{label}" if self._path else label
+            raise GustformError("GF2002", f"{type(self).__name__}: {path} must be finite; got {result}")
+        return result
+
+    def start_value(self, declaration: Variable | Discrete) -> float:
+        """The start of a variable or discrete value: given to the constructor, bound by the parent, or declared."""
+        given = self._modifiers.get(declaration.name, declaration.start)
+        owner = self._parent if self._parent is not None and self.is_bound(declaration.name) else self
+        return owner.number(given, f"{declaration.name} (start)")
 
     def structure_key(self) -> tuple[Any, ...]:
         """Equal keys mean equal equations: class, structural values, and those of the parts."""
@@ -268,8 +301,8 @@ class Component:
     ) -> None:
         """When `condition` (a comparison, or several joined by logic_and/logic_or) becomes true: set discrete
         values (`assign`) and states (`reinit`). The right-hand sides see the values before the event."""
-        self._need_scope().add_when(condition, assign or {}, reinit or {}, _caller())
+        self._need_scope().add_when(condition, assign or {}, reinit or {}, _caller(": "))
 
     def sampled(self, period: Any, assign: dict[Any, Any], *, reinit: dict[Any, Any] | None = None) -> None:
         """Every `period` (a parameter in s): set discrete values; the block of a sampled controller."""
-        self._need_scope().add_sampled(period, assign, reinit or {}, _caller())
+        self._need_scope().add_sampled(period, assign, reinit or {}, _caller(": "))

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from gustform.language.declare import Declaration, Value
+from gustform.language.declare import Declaration, Value, refuse_assignment
 from gustform.language.errors import GustformError
 
 if TYPE_CHECKING:
@@ -65,6 +65,13 @@ class Connector:
         self.description = description
         self.start = start or {}
         self.nominal = nominal or {}
+        for name in {**self.start, **self.nominal}:
+            if name not in self._potentials and name not in self._flows:
+                raise GustformError(
+                    "GF1006",
+                    f"connector {type(self).__name__} has no quantity {name!r}",
+                    hint=" or ".join([*self._potentials, *self._flows]),
+                )
         self.optional = optional  # may be left unconnected: its flows are then zero
 
     def __set_name__(self, owner: type, name: str) -> None:
@@ -74,6 +81,9 @@ class Connector:
         if instance is None:
             return self
         return instance._get(self)
+
+    def __set__(self, instance: Component, value: object) -> None:
+        refuse_assignment(instance, self.name)
 
 
 class Port:
@@ -85,6 +95,8 @@ class Port:
         self.symbols = symbols
 
     def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)  # what Python and CasADi ask any object for
         try:
             return self.symbols[name]
         except KeyError:

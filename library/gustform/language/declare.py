@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from gustform.language.errors import GustformError
 from gustform.language.units import Dimension, dimension_of
@@ -18,6 +18,15 @@ if TYPE_CHECKING:
 
 # A number, or a function of the component it is declared in (numbers in, number out).
 Value = float | Callable[[Any], Any]
+
+
+def refuse_assignment(instance: Component, name: str) -> NoReturn:
+    """GF1002: what is declared is given to the constructor."""
+    raise GustformError(
+        "GF1002",
+        f"{type(instance).__name__}.{name} cannot be assigned after construction",
+        hint=f"{type(instance).__name__}({name}=...)",
+    )
 
 
 class Declaration:
@@ -39,11 +48,7 @@ class Declaration:
         return instance._get(self)
 
     def __set__(self, instance: Component, value: object) -> None:
-        raise GustformError(
-            "GF1002",
-            f"{type(instance).__name__}.{self.name} cannot be assigned after construction",
-            hint=f"{type(instance).__name__}({self.name}=...)",
-        )
+        refuse_assignment(instance, self.name)
 
 
 def _check_finite(kind: str, owner: str, label: str, value: float) -> float:
@@ -204,3 +209,6 @@ class Part:
         if instance is None:
             return self
         return instance._get(self)
+
+    def __set__(self, instance: Component, value: object) -> None:
+        refuse_assignment(instance, self.name)

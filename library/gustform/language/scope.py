@@ -225,7 +225,7 @@ class Scope:
                 self._expression(condition, source),
                 None,
                 self._assignments(assign, ("discrete",), source),
-                self._assignments(reinit, ("variable",), source),
+                self._assignments(reinit, ("variable", "output"), source),
                 self.path,
                 source,
             )
@@ -237,7 +237,7 @@ class Scope:
                 None,
                 self._expression(period, source),
                 self._assignments(assign, ("discrete",), source),
-                self._assignments(reinit, ("variable",), source),
+                self._assignments(reinit, ("variable", "output"), source),
                 self.path,
                 source,
             )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass, field
 
@@ -10,10 +11,10 @@ from numpy.typing import NDArray
 
 from gustform.language.component import Component, suggest
 from gustform.language.connector import Connector
-from gustform.language.declare import Input, Parameter
+from gustform.language.declare import Input, Parameter, Part
 from gustform.language.errors import GustformError
 
-_NAME = re.compile(r"^[A-Za-z_][A-Za-z0-9_]*(\[[0-9]+\])?$")
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*(\[[0-9]+\])?")
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,26 @@ class Series:
     on_end: str = "error"
     t_end: float = float("inf")
 
+    def __post_init__(self) -> None:
+        wrong = ""
+        if self.interpolation not in ("linear", "hold"):
+            wrong = f"interpolation must be linear or hold; got {self.interpolation!r}"
+        elif self.on_end not in ("error", "hold", "repeat"):
+            wrong = f"on_end must be error, hold or repeat; got {self.on_end!r}"
+        elif self.time is None and not (math.isfinite(self.dt) and self.dt > 0 and math.isfinite(self.t0)):
+            wrong = f"without times its samples need a spacing dt > 0 from t0; got {self.dt} from {self.t0}"
+        elif self.value is not None and (self.value.ndim != 1 or self.value.size == 0):
+            wrong = f"its values must be one row of numbers; got shape {self.value.shape}"
+        elif self.value is not None and not np.all(np.isfinite(self.value)):
+            wrong = f"value number {int(np.argmin(np.isfinite(self.value)))} is not finite"
+        elif self.value is not None and self.time is not None:
+            if self.time.shape != self.value.shape:
+                wrong = f"it has {self.time.size} times for {self.value.size} values"
+            elif not np.all(np.isfinite(self.time)) or not np.all(np.diff(self.time) > 0):
+                wrong = "its times must be finite and increasing"
+        if wrong:
+            raise GustformError("GF2013", f"series {self.name!r}: {wrong}")
+
 
 @dataclass(frozen=True)
 class Change:
@@ -64,7 +85,7 @@ class System:
 
     def add(self, name: str, component: Component) -> Component:
         """Add a unit. Names are letters, digits and _, optionally with an index: wt, wt[3]."""
-        if not _NAME.match(name):
+        if not _NAME.fullmatch(name):
             raise GustformError(
                 "GF2005", f"component name {name!r} is not usable", hint="letters, digits and _, e.g. wt or wt[3]"
             )
@@ -116,21 +137,37 @@ class System:
         return declaration
 
     def bind(self, path: str, source: Constant | Series) -> None:
-        """Drive an input by a constant or a series."""
-        self._input(path)
+        """Drive an input by a constant or a series. Binding it again replaces the source."""
+        declaration = self._input(path)
+        if path in self.signals:
+            raise GustformError(
+                "GF2012", f"{path} is driven by {self.signals[path]} already", hint="one source for each input"
+            )
+        value = source.value if isinstance(source, Constant) else source.operating_value
+        if not math.isfinite(value):
+            raise GustformError(
+                "GF2002",
+                f"{path} must be a finite number ({declaration.description}, {declaration.unit}); got {value}",
+                hint=f"a number in {declaration.unit}",
+            )
         self.inputs[path] = source
 
     def signal(self, target: str, source: str) -> None:
         """Wire an input of one unit to a variable of another: signal("wt.frame", "sg.omega")."""
         self._input(target)
         self.split(source)
+        if target in self.inputs:
+            raise GustformError(
+                "GF2012", f"{target} is driven by a constant or a series already", hint="one source for each input"
+            )
         self.signals[target] = source
 
     def frame(self, source: str) -> None:
         """Wire the input `frame` of every unit that has one to the speed of the reference machine."""
         for name, component in self.components.items():
-            if "frame" in component.declared(Input) and f"{name}.frame" not in self.signals:
-                self.signal(f"{name}.frame", source)
+            path = f"{name}.frame"
+            if "frame" in component.declared(Input) and path not in self.signals and path not in self.inputs:
+                self.signal(path, source)
 
     def change(self, at: float, path: str, value: float) -> None:
         """Schedule a parameter change; the value is checked against the declaration."""
@@ -138,8 +175,9 @@ class System:
         component = self.components[name]
         *parts, parameter = rest.split(".")
         for part in parts:
-            if part not in component.parameter_names():
-                raise GustformError("GF2008", f"{path}: no part {part!r}")
+            known = list(component.declared(Part))
+            if part not in known:
+                raise GustformError("GF2008", f"{path}: no part {part!r}", hint=suggest(part, known))
             component = component.part(part)
         parameters = component.declared(Parameter)
         if parameter not in parameters:
@@ -149,4 +187,6 @@ class System:
         declaration = parameters[parameter]
         if declaration.structural:
             raise GustformError("GF2008", f"{path} cannot change while the model runs")
+        if not math.isfinite(at):
+            raise GustformError("GF2002", f"the time of a change of {path} must be finite; got {at}")
         self.schedule.append(Change(float(at), path, declaration.check(value, path)))

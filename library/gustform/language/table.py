@@ -56,18 +56,24 @@ class TableData:
         self, x: NDArray[np.float64], y: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Value and both partial derivatives of the spline at points; the same formula as the C runtime."""
-        s = self.spline()
-        width = s["n_y"] + 2
-        i, wa, da = _weights(x, s["x_start"], s["x_step"], s["n_x"])
-        j, wb, db = _weights(y, s["y_start"], s["y_step"], s["n_y"])
-        value, dx, dy = np.zeros_like(x), np.zeros_like(x), np.zeros_like(x)
-        for a in range(4):
-            for b in range(4):
-                c = s["coefficient"][(i + a) * width + j + b]
-                value += wa[a] * wb[b] * c
-                dx += da[a] * wb[b] * c
-                dy += wa[a] * db[b] * c
-        return value, dx, dy
+        return evaluate_spline(self.spline(), x, y)
+
+
+def evaluate_spline(
+    s: dict[str, Any], x: NDArray[np.float64], y: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Value and both partial derivatives of a spline as `TableData.spline` gives it."""
+    width = s["n_y"] + 2
+    i, wa, da = _weights(x, s["x_start"], s["x_step"], s["n_x"])
+    j, wb, db = _weights(y, s["y_start"], s["y_step"], s["n_y"])
+    value, dx, dy = np.zeros_like(x), np.zeros_like(x), np.zeros_like(x)
+    for a in range(4):
+        for b in range(4):
+            c = s["coefficient"][(i + a) * width + j + b]
+            value += wa[a] * wb[b] * c
+            dx += da[a] * wb[b] * c
+            dy += wa[a] * db[b] * c
+    return value, dx, dy
 
 
 def _weights(x: NDArray[np.float64], start: float, step: float, n: int) -> tuple[NDArray[np.int64], Any, Any]:
@@ -139,8 +145,6 @@ def _uniform_spline(x: NDArray[np.float64], y: NDArray[np.float64], value: NDArr
         "coefficient": np.ascontiguousarray(coefficient).ravel(),
         "error": 0.0,
     }
-    table = TableData.__new__(TableData)
-    object.__setattr__(table, "_spline", spline)
     xx, yy = np.meshgrid(x, y, indexing="ij")
-    spline["error"] = float(np.max(np.abs(table.evaluate(xx.ravel(), yy.ravel())[0] - value.ravel())))
+    spline["error"] = float(np.max(np.abs(evaluate_spline(spline, xx.ravel(), yy.ravel())[0] - value.ravel())))
     return spline

@@ -15,17 +15,21 @@ import casadi as ca
 from gustform.language.errors import GustformError, Place
 from gustform.language.operators import constants, table_calls
 from gustform.language.scope import Elaborated, Equation, derivative_dimension
-from gustform.language.units import DIMENSIONLESS, Dimension
+from gustform.language.units import DIMENSIONLESS, SECOND, Dimension
 
 # A dimension, or None for the number 0, which fits anywhere; with the value if the node is a number.
 _Node = tuple[Dimension | None, float | None]
 
-_SAME = {ca.OP_ADD: "+", ca.OP_SUB: "-", ca.OP_FMIN: "min", ca.OP_FMAX: "max"}
+_SAME = {ca.OP_ADD: "+", ca.OP_SUB: "-", ca.OP_FMIN: "min", ca.OP_FMAX: "max", ca.OP_HYPOT: "hypot"}
 _COMPARE = {ca.OP_LT: "<", ca.OP_LE: "<=", ca.OP_EQ: "==", ca.OP_NE: "!="}
 _KEEP = {ca.OP_NEG, ca.OP_FABS, ca.OP_TWICE, ca.OP_ASSIGN}
 
 
 class _Mismatch(Exception):
+    pass
+
+
+class _Undeclared(Exception):
     pass
 
 
@@ -99,27 +103,45 @@ def check_units(elaborated: Elaborated) -> None:
             return dimensions[key]
         if key in constants:
             return constants[key].dimension
-        return table_calls[key].table.dimension
+        if key in table_calls:
+            return table_calls[key].table.dimension
+        raise _Undeclared(str(symbol))
 
-    def both(equation: Equation) -> None:
+    def arguments(expression: Any) -> None:
+        for symbol in ca.symvar(expression):
+            call = table_calls.get(symbol.element_hash())
+            if call is not None:
+                for argument, wanted, axis in (
+                    (call.x, call.table.x_dimension, "x"),
+                    (call.y, call.table.y_dimension, "y"),
+                ):
+                    _agree((_walk(argument, dimension), None), (wanted, None), f"the table's {axis}")
+                    arguments(argument)
+
+    def both(equation: Equation, what: str = "'='") -> None:
+        place = Place(equation.source.file, equation.source.line)
         try:
             lhs, rhs = _walk(equation.lhs, dimension), _walk(equation.rhs, dimension)
-            _agree((lhs, None), (rhs, None), "'='")
-            for side in (equation.lhs, equation.rhs):
-                for symbol in ca.symvar(side):
-                    call = table_calls.get(symbol.element_hash())
-                    if call is not None:
-                        _agree((_walk(call.x, dimension), None), (call.table.x_dimension, None), "the table's x")
-                        _agree((_walk(call.y, dimension), None), (call.table.y_dimension, None), "the table's y")
+            _agree((lhs, None), (rhs, None), what)
+            arguments(equation.lhs)
+            arguments(equation.rhs)
         except _Mismatch as mismatch:
-            source = equation.source
             raise GustformError(
                 "GF1020",
                 f"units do not match in {equation}: {mismatch}",
                 hint="the unit of each term (gustform info lists the declared ones)",
-                place=Place(source.file, source.line) if source.file else None,
+                place=place,
+            ) from None
+        except _Undeclared as symbol:
+            raise GustformError(
+                "GF1019",
+                f"{symbol} in {equation} is not declared in this model",
+                hint="a Variable or Parameter of the component, reached through self",
+                place=place,
             ) from None
 
+    second = ca.SX.sym("1 s")
+    dimensions[second.element_hash()] = SECOND
     for equation in [*elaborated.equations, *elaborated.initial]:
         both(equation)
     for when in elaborated.whens:
@@ -127,3 +149,5 @@ def check_units(elaborated: Elaborated) -> None:
             both(Equation(target, value, when.path, when.source))
         if when.condition is not None:
             both(Equation(when.condition, when.condition, when.path, when.source))
+        else:
+            both(Equation(when.period, second, when.path, when.source), "the sample period")
