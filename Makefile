@@ -27,7 +27,7 @@ TEST_SOURCES := $(shell find tests/c -type f 2>/dev/null)
 
 PIP_INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-input --constraint tools/constraints.txt
 # Set-up runs in a make of its own under a lock, so that two makes in one work tree do not both build it.
-SET_UP = @flock .make.lock $(MAKE) --silent
+SET_UP = +@flock .make.lock $(MAKE) --silent
 # The output of a step that normally says nothing of interest; shown when the step fails.
 QUIETLY = tools/quietly.sh
 say = @echo '== $(1)'
