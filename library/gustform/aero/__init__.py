@@ -1,0 +1,1 @@
+"""Rotor aerodynamics: from wind, rotor speed and pitch to torque."""

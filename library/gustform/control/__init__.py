@@ -1,0 +1,1 @@
+"""Controllers of converters and pitch, and the operating points they are designed for."""

@@ -1,0 +1,49 @@
+"""Blade pitch controller: proportional part, speed limiter, power limiter, servo."""
+
+from __future__ import annotations
+
+from gustform.control.pi_limiter import PiLimiter
+from gustform.control.pitch_servo import PitchServo
+from gustform.language import Component, Input, Output, Parameter, Part, Variable, maximum
+
+
+class PitchControl(Component):
+    """Pitch angle from rotor speed and power.
+
+        beta_ref = max(beta_min, beta_del + K_p (omega_r - omega_del) + u_speed + u_power)
+        u_speed  = PI limiter of omega_r above omega_max
+        u_power  = PI limiter of P/(T_P s + 1) above P_max
+
+    and the servo behind it. Angles in deg; omega_r in pu of the turbine's base speed, P (electrical, from the machine)
+    in pu of the rating of one turbine; time in s.
+    Source: Lyu, Subotic, Gross 2022, eq. (12), Fig. 8; gains of the limiters: project notes.
+    """
+
+    beta_del = Parameter("deg", "pitch angle at the operating point", default=0.0, min=0.0)
+    omega_del = Parameter("pu", "rotor speed at the operating point", default=1.2, above=0.0)
+    K_p = Parameter("deg", "pitch for speed, deg/pu", default=0.0, min=0.0)
+    beta_min = Parameter("deg", "lowest pitch demand", default=0.0)
+    omega_max = Parameter("pu", "speed above which the speed limiter acts", default=1.2, above=0.0)
+    P_max = Parameter("pu", "power above which the power limiter acts", default=1.0, above=0.0)
+    T_P = Parameter("s", "time constant of the filter of the power", default=0.5, above=0.0)
+    P_start = Parameter("pu", "first guess of the power", default=0.5)
+
+    speed_limiter = Part(PiLimiter, "limits the rotor speed", x_max=lambda self: self.omega_max, k_p=60.0, k_i=12.0)
+    power_limiter = Part(PiLimiter, "limits the power", x_max=lambda self: self.P_max, k_p=1.0, k_i=2.0)
+    servo = Part(PitchServo, "pitch actuator", beta_start=lambda self: self.beta_del)
+
+    omega_r = Input("pu", "rotor speed", start=1.2)
+    P = Input("pu", "active power taken from the machine", start=0.5)
+    beta = Output("deg", "pitch angle", nominal=10.0)
+    P_filtered = Variable("pu", "filtered power", start=lambda self: self.P_start)
+    beta_ref = Variable("deg", "pitch demand", nominal=10.0)
+
+    def equations(self) -> None:
+        speed_limiter, power_limiter, servo = self.speed_limiter, self.power_limiter, self.servo
+        self.eq(self.T_P * self.der(self.P_filtered), self.P - self.P_filtered)
+        self.connect(speed_limiter.x, self.omega_r)
+        self.connect(power_limiter.x, self.P_filtered)
+        proportional = self.beta_del + self.K_p * (self.omega_r - self.omega_del)
+        self.eq(self.beta_ref, maximum(proportional + speed_limiter.u + power_limiter.u, self.beta_min))
+        self.connect(servo.beta_ref, self.beta_ref)
+        self.connect(self.beta, servo.beta)

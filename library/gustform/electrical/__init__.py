@@ -1,0 +1,1 @@
+"""Machines, converters, network and loads at phasor (RMS) fidelity."""

@@ -1,0 +1,1 @@
+"""Whole turbines, assembled from parts."""

@@ -1,0 +1,198 @@
+"""Wind turbine with a permanent-magnet generator and a back-to-back converter."""
+
+from __future__ import annotations
+
+from gustform.aero.closed_form_rotor import ClosedFormRotor
+from gustform.aero.rotor import Rotor
+from gustform.control.converter_control import ConverterControl
+from gustform.control.dual_port import DualPort
+from gustform.control.operating_point import (
+    DualPortGains,
+    Limits,
+    OperatingPoint,
+    dual_port_gains,
+    operating_point,
+)
+from gustform.control.pitch import PitchControl
+from gustform.conventions import NOMINAL_FREQUENCY, active_power, reactive_power
+from gustform.electrical.dc_link import DcLink
+from gustform.electrical.gsc import GridSideConverter
+from gustform.electrical.line import Line
+from gustform.electrical.msc import MachineSideConverter
+from gustform.electrical.parallel_units import ParallelUnits
+from gustform.electrical.pmsg import Pmsg
+from gustform.electrical.transformer import Transformer
+from gustform.interfaces import AcPort
+from gustform.language import Component, Input, Output, Parameter, Part, Variable
+from gustform.mechanical.one_mass import OneMass
+
+
+class PmsgTurbine(Component):
+    """PMSG wind turbine with grid-forming control, or `aggregate` identical ones.
+
+        wind -> rotor -- drive train -- PMSG -- MSC -- DC link -- GSC -- transformer -- line -- grid
+                  ^ pitch control                  \\--- control ---/
+
+    Everything inside is one turbine; its currents are multiplied by `aggregate` at the grid port. pu: base `rating` of
+    one turbine, `omega_base` for the rotor, `v_dc_base`, `voltage_converter` and `voltage` for the AC sides, f0. Signs:
+    P_wt from the wind, P_pmsg from the machine into the MSC, P_gsc out of the GSC, P and Q delivered at the port.
+
+    `omega_del`, `beta_del`, `K_msc` and `K_p` follow from the operating point at `wind_speed` with the control's
+    `curtailment` unless they are given. Source: Lyu, Subotic, Gross 2022, with the project notes; see the parts.
+    """
+
+    aggregate = Parameter("1", "number of identical turbines", default=1.0, min=1.0)
+    rating = Parameter("VA", "rated power of one turbine, base of pu", default=5e6, above=0.0)
+    voltage = Parameter("V", "nominal line-to-line RMS voltage at the grid port", default=33e3, above=0.0)
+    voltage_converter = Parameter(
+        "V", "nominal line-to-line RMS voltage of converter and machine", default=3.3e3, above=0.0
+    )
+    v_dc_base = Parameter("V", "nominal DC voltage", default=7920.0, above=0.0)
+    omega_base = Parameter("1/s", "rotor speed that is 1 pu, rad/s", default=1.1417, above=0.0)
+    f0 = Parameter("Hz", "nominal frequency", default=NOMINAL_FREQUENCY, above=0.0)
+    r_line = Parameter("pu", "resistance of the line to the port, base rating and voltage", default=0.002, min=0.0)
+    x_line = Parameter("pu", "reactance of the line to the port", default=0.04, above=0.0)
+
+    wind_speed = Parameter("m/s", "wind speed of the operating point", default=8.0, above=0.0)
+    curtailment = Parameter(
+        "1", "share of the available power held back, 1 - eta; 0 is maximum power", default=0.0, min=0.0, max=0.95
+    )
+    omega_max = Parameter("pu", "highest operating speed", default=1.2, above=0.0)
+    beta_min = Parameter("deg", "lowest pitch angle", default=0.0)
+    cut_in = Parameter("m/s", "lowest wind speed of operation", default=3.0, above=0.0)
+    cut_out = Parameter("m/s", "highest wind speed of operation", default=25.0, above=0.0)
+    omega_del = Parameter(
+        "pu", "rotor speed at the operating point", default=lambda self: self.operating_point().omega_del, above=0.0
+    )
+    beta_del = Parameter(
+        "deg", "pitch angle at the operating point", default=lambda self: self.operating_point().beta_del
+    )
+    K_msc = Parameter("pu", "droop of the machine side", default=lambda self: self.gains().K_msc, min=0.0)
+    K_p = Parameter("deg", "pitch for speed, deg/pu", default=lambda self: self.gains().K_p, min=0.0)
+
+    wind = Input("m/s", "rotor-effective wind speed", start=8.0, nominal=10.0)
+    frame = Input("pu", "speed of the phasor frame, base f0", start=1.0)
+    grid = AcPort(
+        "grid port of all turbines",
+        start={"vr": lambda self: self.voltage},
+        nominal={"vr": lambda self: self.voltage, "vi": lambda self: self.voltage},
+    )
+
+    rotor = Part(ClosedFormRotor, "aerodynamics", base=Rotor)
+    drive = Part(OneMass, "drive train", w_start=lambda self: self.omega_del * self.omega_base)
+    pmsg = Part(
+        Pmsg,
+        "generator",
+        rating=lambda self: self.rating,
+        voltage=lambda self: self.voltage_converter,
+        omega_base=lambda self: self.omega_base,
+    )
+    msc = Part(MachineSideConverter, "machine-side converter", voltage=lambda self: self.voltage_converter)
+    dc_link = Part(DcLink, "DC link", voltage=lambda self: self.v_dc_base)
+    gsc = Part(
+        GridSideConverter,
+        "grid-side converter",
+        rating=lambda self: self.rating,
+        voltage=lambda self: self.voltage_converter,
+        f0=lambda self: self.f0,
+    )
+    transformer = Part(
+        Transformer,
+        "turbine transformer",
+        rating=lambda self: self.rating,
+        voltage_primary=lambda self: self.voltage_converter,
+        voltage_secondary=lambda self: self.voltage,
+        x=0.06,
+    )
+    line = Part(
+        Line,
+        "line to the grid port",
+        voltage=lambda self: self.voltage,
+        R=lambda self: self.r_line * self.voltage * self.voltage / self.rating,
+        X=lambda self: self.x_line * self.voltage * self.voltage / self.rating,
+    )
+    units = Part(ParallelUnits, "turbines in parallel", n=lambda self: self.aggregate)
+    control = Part(
+        DualPort,
+        "control of both converters",
+        base=ConverterControl,
+        curtailment=lambda self: self.curtailment,
+        omega_del=lambda self: self.omega_del,
+        K_msc=lambda self: self.K_msc,
+    )
+    pitch = Part(
+        PitchControl,
+        "pitch control",
+        beta_del=lambda self: self.beta_del,
+        omega_del=lambda self: self.omega_del,
+        K_p=lambda self: self.K_p,
+        omega_max=lambda self: self.omega_max,
+        beta_min=lambda self: self.beta_min,
+        P_start=lambda self: self.operating_point().power,
+    )
+
+    v_dc = Variable("pu", "DC voltage, base v_dc_base", start=1.0)
+    omega_r = Variable("pu", "rotor speed, base omega_base", start=1.2)
+    beta = Variable("deg", "pitch angle", nominal=10.0)
+    frequency = Variable("Hz", "frequency of the GSC voltage", start=NOMINAL_FREQUENCY, nominal=NOMINAL_FREQUENCY)
+    P_wt = Variable("pu", "power from the wind, base rating", start=0.5)
+    P_pmsg = Variable("pu", "power from the machine into the MSC, base rating", start=0.5)
+    P_gsc = Variable("pu", "active power out of the GSC, base rating", start=0.5)
+    Q_gsc = Variable("pu", "reactive power out of the GSC, base rating")
+    Q_msc = Variable("pu", "reactive power of the MSC into the machine, base rating")
+    P = Variable("W", "active power of all turbines, delivered at the port", start=1e6, nominal=1e6)
+    Q = Variable("var", "reactive power of all turbines, delivered at the port", nominal=1e6)
+    omega_gsc = Output("pu", "frequency of the GSC voltage, base f0", start=1.0)
+
+    def operating_point(self) -> OperatingPoint:
+        """Where this turbine works in a constant wind of `wind_speed`."""
+        limits = Limits(self.rating, self.omega_base, self.omega_max, self.beta_min, self.cut_in, self.cut_out)
+        return operating_point(self.rotor, self.wind_speed, self.control.curtailment, limits)
+
+    def gains(self) -> DualPortGains:
+        """The largest gains of dual-port control that the operating point allows."""
+        control = self.control
+        if not isinstance(control, DualPort):
+            return DualPortGains(0.0, 0.0, float("inf"))
+        return dual_port_gains(self.operating_point(), control.K_gsc, control.frequency_reserve)
+
+    def equations(self) -> None:
+        rotor, drive, pmsg, msc, gsc = self.rotor, self.drive, self.pmsg, self.msc, self.gsc
+        control, pitch = self.control, self.pitch
+        # mechanics and power
+        self.connect(rotor.wind, self.wind)
+        self.connect(rotor.shaft, drive.shaft)
+        self.connect(pmsg.shaft, drive.shaft)
+        self.connect(pmsg.terminal, msc.machine)
+        self.connect(msc.dc, self.dc_link.machine)
+        self.connect(gsc.dc, self.dc_link.grid)
+        self.connect(gsc.grid, self.transformer.primary)
+        self.connect(self.transformer.secondary, self.line.sending)
+        self.connect(self.line.receiving, self.units.one)
+        self.connect(self.units.all, self.grid)
+        # measurements, pu
+        self.eq(self.v_dc, self.dc_link.v / self.v_dc_base)
+        self.eq(self.omega_r, drive.w / self.omega_base)
+        self.eq(self.P_wt, rotor.P / self.rating)
+        self.eq(self.P_pmsg, msc.P / self.rating)
+        self.eq(self.P_gsc, gsc.P / self.rating)
+        self.eq(self.Q_gsc, gsc.Q / self.rating)
+        self.eq(self.Q_msc, msc.Q / self.rating)
+        # control
+        self.connect(control.v_dc, self.v_dc)
+        self.connect(control.Q_gsc, self.Q_gsc)
+        self.connect(control.Q_msc, self.Q_msc)
+        self.connect(control.omega_gsc, gsc.omega)
+        self.connect(control.V_gsc, gsc.V)
+        self.connect(control.omega_msc, pmsg.frame)
+        self.connect(control.V_msc, msc.V)
+        self.connect(gsc.frame, self.frame)
+        self.connect(pitch.omega_r, self.omega_r)
+        self.connect(pitch.P, self.P_pmsg)
+        self.connect(pitch.beta, rotor.beta)
+        # what a user looks at
+        self.connect(self.beta, pitch.beta)
+        self.connect(self.omega_gsc, gsc.omega)
+        self.eq(self.frequency, self.f0 * self.omega_gsc)
+        self.eq(self.P, -active_power(self.grid))
+        self.eq(self.Q, -reactive_power(self.grid))
