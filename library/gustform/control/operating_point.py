@@ -30,7 +30,7 @@ _SCAN = 601  # points of a scan that brackets a root; the curves have at most tw
 _ON_TARGET = 1e-9  # of Cp: what a solution may miss
 _ROUND_OFF = 1e-12  # relative
 
-_OPTIONS = {
+_OPTIONS: dict[str, Any] = {
     "print_time": False,
     "ipopt": {
         "print_level": 0,
