@@ -51,7 +51,7 @@ class Source:
 
 def _equation_text(call: str, joiner: str) -> str:
     """ "C * der(v) = i" from the arguments of "self.eq(self.C * self.der(self.v), self.i)"."""
-    call = " ".join(call.split()).removesuffix(",")
+    call = re.sub(r"(?<=[(\[{]) |,? (?=[)\]}])", "", " ".join(call.split())).removesuffix(",")
     depth = 0
     for position, character in enumerate(call):
         depth += (character in "([{") - (character in ")]}")

@@ -36,6 +36,8 @@ class Dimension:
         return Dimension(tuple(a * power for a in self.exponents))
 
     def __str__(self) -> str:
+        if self in _SHOWN:
+            return _SHOWN[self]
         parts = [
             base if power == 1 else f"{base}^{power}"
             for base, power in zip(_BASES, self.exponents, strict=True)
@@ -76,6 +78,10 @@ _UNITS: dict[str, Dimension] = {
     "H": _dimension(kg=1, m=2, s=-2, A=-2),
     "Wb": _dimension(kg=1, m=2, s=-2, A=-1),
 }
+
+# How messages write dimensions that have a name; the others are products of base units.
+_SHOWN = {_UNITS[name]: name for name in ("N", "Pa", "W", "V", "ohm", "S", "F", "H")}
+_SHOWN |= {_UNITS["J"]: "N*m", _UNITS["Wb"]: "V*s", _UNITS["C"]: "A*s", _UNITS["Hz"]: "1/s"}
 
 _TOKEN = re.compile(r"\s*(?:(?P<name>[A-Za-z]+|1)(?:\^(?P<power>-?\d+))?|(?P<op>[*/()]))")
 
