@@ -167,7 +167,6 @@ static damped damped_step(gust_initial *initial, double t, double *y, double *yp
 {
     gust_system *system = initial->system;
     const double tolerance = initial->options->initial_tolerance;
-    const size_t bytes = (size_t)system->model->n_unknowns * sizeof(double);
     for (double factor = 1.0; factor > 1e-5; factor *= 0.5) {
         try_step(initial, y, yp, initial->correction, factor);
         if (!gust_system_residual(system, t, initial->trial_y, initial->trial_yp, initial->residual)) {
@@ -176,10 +175,7 @@ static damped damped_step(gust_initial *initial, double t, double *y, double *yp
         if (gust_system_not_finite(system, initial->residual) >= 0) {
             continue;
         }
-        memcpy(initial->next_correction, initial->residual, bytes);
-        if (!gust_factors_solve(&initial->factors, initial->next_correction)) {
-            continue;
-        }
+        gust_factors_solve(&initial->factors, initial->residual, initial->next_correction);
         const double next = weighted_norm(initial, initial->next_correction);
         if (factor == 1.0 && next < tolerance) {
             keep_trial(initial, y, yp);
@@ -203,7 +199,6 @@ gust_status gust_initial_solve(gust_initial *initial, double t, double *y, doubl
                                char *message, size_t size)
 {
     gust_system *system = initial->system;
-    const size_t bytes = (size_t)system->model->n_unknowns * sizeof(double);
     const int limit = (int)initial->options->initial_iterations;
     for (int iteration = 1; iteration <= limit; ++iteration) {
         if (!gust_system_residual(system, t, y, yp, initial->residual) || !set_matrix(initial, t, y, yp)) {
@@ -218,10 +213,7 @@ gust_status gust_initial_solve(gust_initial *initial, double t, double *y, doubl
         }
         ++initial->iterations;
         set_weights(initial, y, yp);
-        memcpy(initial->correction, initial->residual, bytes);
-        if (!gust_factors_solve(&initial->factors, initial->correction)) {
-            return singular(initial, t, thorough, message, size);
-        }
+        gust_factors_solve(&initial->factors, initial->residual, initial->correction);
         const double norm = weighted_norm(initial, initial->correction);
         if (!isfinite(norm)) {
             return singular(initial, t, thorough, message, size);
@@ -272,10 +264,10 @@ double gust_initial_step(gust_initial *initial, double t, const double *y, doubl
     for (int32_t i = 0; i < n; ++i) {
         initial->correction[i] = (initial->residual[i] - initial->correction[i]) / little;
     }
-    if (gust_system_not_finite(system, initial->correction) >= 0 ||
-        !gust_factors_solve(&initial->factors, initial->correction)) {
+    if (gust_system_not_finite(system, initial->correction) >= 0) {
         return 1e-6;
     }
+    gust_factors_solve(&initial->factors, initial->correction, initial->correction);
     double sum = 0.0;
     for (int32_t i = 0; i < n; ++i) {
         if (model->differential[i]) {

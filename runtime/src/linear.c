@@ -15,6 +15,13 @@ static int32_t *writable(const int32_t *array)
     return same;
 }
 
+static double *writable_values(const double *array)
+{
+    double *same;
+    memcpy(&same, &array, sizeof same);
+    return same;
+}
+
 void gust_factors_start(gust_factors *factors, int32_t n, const int32_t *column_start, const int32_t *row_index,
                         klu_symbolic *symbolic, const klu_common *common)
 {
@@ -29,65 +36,66 @@ void gust_factors_start(gust_factors *factors, int32_t n, const int32_t *column_
 
 void gust_factors_free(gust_factors *factors)
 {
-    if (factors->numeric != NULL) {
-        klu_free_numeric(&factors->numeric, &factors->common);
-    }
+    gust_lu_free(&factors->lu);
+    factors->planned = false;
 }
 
-static bool factor(gust_factors *factors, double *values)
+/* With pivots chosen for these values. */
+static bool factor(gust_factors *factors, const double *values)
 {
-    if (factors->numeric != NULL) {
-        klu_free_numeric(&factors->numeric, &factors->common);
-    }
+    klu_common *common = &factors->common;
     ++factors->factorisations;
     factors->since_check = 0;
     factors->fresh_pivots = false;
-    factors->numeric =
-        klu_factor(factors->column_start, factors->row_index, values, factors->symbolic, &factors->common);
+    factors->planned = false;
     factors->singular_column = -1;
-    if (factors->numeric == NULL || factors->common.status != KLU_OK) {
-        factors->fresh_pivots = true;
-        factors->singular_column = factors->common.status == KLU_SINGULAR ? factors->common.singular_col : -1;
+    klu_numeric *numeric = klu_factor(factors->column_start, factors->row_index, writable_values(values),
+                                      factors->symbolic, common);
+    const bool regular = numeric != NULL && common->status == KLU_OK;
+    if (!regular) {
+        factors->singular_column = common->status == KLU_SINGULAR ? common->singular_col : -1;
+    }
+    const bool planned = regular && gust_lu_plan(&factors->lu, factors->column_start, factors->row_index,
+                                                 values, factors->symbolic, numeric, common);
+    if (regular && !planned) {
+        common->status = KLU_OUT_OF_MEMORY;
+    }
+    if (numeric != NULL) {
+        klu_free_numeric(&numeric, common);
+    }
+    if (!planned) {
         return false;
     }
+    if (!gust_lu_factor(&factors->lu, values)) {
+        factors->singular_column = factors->lu.column_of[factors->lu.singular_pivot];
+        return false;
+    }
+    factors->planned = true;
     return true;
 }
 
-static bool grown(gust_factors *factors, double *values)
+/* The pivots have become bad. */
+static bool grown(gust_factors *factors, const double *values)
 {
     if (factors->growth_check == 0 || ++factors->since_check < factors->growth_check) {
         return false;
     }
     factors->since_check = 0;
-    return klu_rgrowth(factors->column_start, factors->row_index, values, factors->symbolic, factors->numeric,
-                       &factors->common) != 1 ||
-           factors->common.rgrowth < factors->growth_limit;
+    return gust_lu_growth(&factors->lu, values) < factors->growth_limit;
 }
 
-bool gust_factors_set(gust_factors *factors, double *values)
+bool gust_factors_set(gust_factors *factors, const double *values)
 {
-    if (factors->numeric == NULL || factors->fresh_pivots) {
+    if (!factors->planned || factors->fresh_pivots) {
         return factor(factors, values);
     }
     ++factors->refactorisations;
-    const int done = klu_refactor(factors->column_start, factors->row_index, values, factors->symbolic,
-                                  factors->numeric, &factors->common);
-    if (done != 1 || factors->common.status != KLU_OK || grown(factors, values)) {
-        return factor(factors, values);
-    }
-    return true;
+    return (gust_lu_factor(&factors->lu, values) && !grown(factors, values)) || factor(factors, values);
 }
 
-bool gust_factors_solve(gust_factors *factors, double *right)
+void gust_factors_solve(gust_factors *factors, const double *right, double *solution)
 {
-    return factors->numeric != NULL &&
-           klu_solve(factors->symbolic, factors->numeric, factors->n, 1, right, &factors->common) == 1;
-}
-
-bool gust_factors_solve_transposed(gust_factors *factors, double *right)
-{
-    return factors->numeric != NULL &&
-           klu_tsolve(factors->symbolic, factors->numeric, factors->n, 1, right, &factors->common) == 1;
+    gust_lu_solve(&factors->lu, right, solution);
 }
 
 /* -- SUNMatrix ------------------------------------------------------------------------------------------ */
@@ -198,12 +206,8 @@ static int solver_solve(SUNLinearSolver solver, SUNMatrix matrix, N_Vector x, N_
 {
     (void)matrix;
     (void)tolerance;
-    double *solution = gust_vector_data(x);
-    const double *right = gust_vector_data(b);
-    if (solution != right) {
-        memcpy(solution, right, (size_t)gust_vector_padded(x) * sizeof *solution);
-    }
-    return gust_factors_solve(solver->content, solution) ? 0 : SUNLS_PACKAGE_FAIL_REC;
+    gust_factors_solve(solver->content, gust_vector_data(b), gust_vector_data(x));
+    return 0;
 }
 
 static int solver_free(SUNLinearSolver solver)

@@ -1,8 +1,7 @@
 /* SUNMatrix in compressed columns with a fixed pattern, and a SUNLinearSolver over KLU for it.
  *
- * The pattern is analysed once. A new Jacobian is refactored with the pivots of the last factorisation;
- * where the pivot growth shows that they have become bad, or the integrator did not converge, it is factored
- * anew with new pivots. */
+ * The pattern is analysed once. A new Jacobian is factored with the pivots of the one before (lu.h); where the
+ * pivot growth shows that they have become bad, or the integrator did not converge, KLU chooses new ones. */
 #ifndef GUSTFORM_LINEAR_H
 #define GUSTFORM_LINEAR_H
 
@@ -10,6 +9,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "lu.h"
 #include "sundials_compat.h"
 
 /* One factorisation of matrices of one pattern. */
@@ -18,7 +18,8 @@ typedef struct gust_factors {
     int32_t *column_start; /* belong to the model; KLU does not write to them */
     int32_t *row_index;
     klu_symbolic *symbolic; /* shared by all factors of a simulation; not owned */
-    klu_numeric *numeric;
+    gust_lu lu;
+    bool planned; /* lu has pivots */
     klu_common common;
     double growth_limit;  /* reciprocal pivot growth under which pivots are chosen anew */
     int64_t growth_check; /* refactorisations between two checks; 0: never */
@@ -35,13 +36,10 @@ void gust_factors_start(gust_factors *factors, int32_t n, const int32_t *column_
 void gust_factors_free(gust_factors *factors);
 
 /* Factors the matrix with these values. false: singular, or out of memory. */
-bool gust_factors_set(gust_factors *factors, double *values);
+bool gust_factors_set(gust_factors *factors, const double *values);
 
-/* Replaces the right-hand side by the solution. */
-bool gust_factors_solve(gust_factors *factors, double *right);
-
-/* The same with the transposed matrix. */
-bool gust_factors_solve_transposed(gust_factors *factors, double *right);
+/* solution = matrix^-1 right, which may be one array. After gust_factors_set has been true. */
+void gust_factors_solve(gust_factors *factors, const double *right, double *solution);
 
 /* The matrix of the integrator: values[nnz] in the column order of the pattern. Free with SUNMatDestroy. */
 SUNMatrix gust_matrix_new(int64_t n_nonzeros, SUNContext context);

@@ -29,6 +29,25 @@ static int residual(sunrealtype t, N_Vector y, N_Vector yp, N_Vector r, void *us
     return 0;
 }
 
+/* An iteration that did not converge casts doubt on the pivots: their growth is looked at with the next
+ * factorisation, and if a second one follows in the same step, new ones are chosen. */
+static void doubt_pivots(gust_solver *solver)
+{
+    long failures = 0;
+    IDAGetNumNonlinSolvConvFails(solver->ida, &failures);
+    if (failures == solver->failures_seen) {
+        return;
+    }
+    solver->failures_seen = failures;
+    long steps = 0;
+    IDAGetNumSteps(solver->ida, &steps);
+    if (steps == solver->doubtful_step) {
+        solver->factors.fresh_pivots = true;
+    }
+    solver->doubtful_step = steps;
+    solver->factors.since_check = solver->factors.growth_check;
+}
+
 static int jacobian(sunrealtype t, sunrealtype cj, N_Vector y, N_Vector yp, N_Vector r, SUNMatrix matrix,
                     void *user_data, N_Vector scratch_1, N_Vector scratch_2, N_Vector scratch_3)
 {
@@ -38,13 +57,7 @@ static int jacobian(sunrealtype t, sunrealtype cj, N_Vector y, N_Vector yp, N_Ve
     (void)scratch_3;
     gust_solver *solver = user_data;
     solver->last_cj = cj;
-    long failures = 0;
-    IDAGetNumNonlinSolvConvFails(solver->ida, &failures);
-    if (failures != solver->nonlinear_failures_seen) {
-        /* Bad pivots are one reason not to converge. */
-        solver->nonlinear_failures_seen = failures;
-        solver->factors.fresh_pivots = true;
-    }
+    doubt_pivots(solver);
     return gust_system_jacobian(solver->system, t, gust_vector_data(y), gust_vector_data(yp), cj,
                                 gust_matrix_values(matrix))
                ? 0
@@ -120,7 +133,8 @@ gust_status gust_solver_create(gust_solver *solver, gust_system *system, gust_ev
                                const gust_options *options, char *message, size_t size)
 {
     const gust_model *model = system->model;
-    *solver = (gust_solver){.system = system, .events = events, .options = options, .bad_row = -1};
+    *solver = (gust_solver){
+        .system = system, .events = events, .options = options, .bad_row = -1, .doubtful_step = -1};
     if (SUNContext_Create(GUST_NO_COMMUNICATOR, &solver->context) != 0) {
         return no_memory(message, size);
     }
@@ -267,7 +281,8 @@ gust_status gust_solver_restart(gust_solver *solver, double t, double first_step
 {
     add_counters(solver, &solver->steps, &solver->error_test_failures, &solver->nonlinear_iterations,
                  &solver->nonlinear_failures);
-    solver->nonlinear_failures_seen = 0;
+    solver->failures_seen = 0;
+    solver->doubtful_step = -1;
     ++solver->restarts;
     if (IDAReInit(solver->ida, t, solver->y, solver->yp) != IDA_SUCCESS ||
         IDASetInitStep(solver->ida, first_step) != IDA_SUCCESS) {

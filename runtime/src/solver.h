@@ -41,7 +41,8 @@ typedef struct gust_solver {
     N_Vector last_yp;
     int32_t bad_row; /* row that was not finite in the last failed evaluation, -1 */
     double bad_row_t;
-    int64_t nonlinear_failures_seen;
+    int64_t failures_seen; /* corrector iterations that did not converge, since the last restart */
+    int64_t doubtful_step; /* step in which the last of them was, -1 */
     /* counters of the runs before the last restart */
     int64_t steps;
     int64_t error_test_failures;

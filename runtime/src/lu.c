@@ -1,0 +1,335 @@
+#include "lu.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "memory.h"
+
+/* -- plan ----------------------------------------------------------------------------------------------- */
+
+static int32_t *integers(size_t count)
+{
+    return gust_allocate(count, sizeof(int32_t));
+}
+
+static bool allocate_pivots(gust_lu *lu, int32_t n, int32_t n_nonzeros)
+{
+    const size_t count = (size_t)n;
+    lu->n = n;
+    lu->row_of = integers(count);
+    lu->column_of = integers(count);
+    lu->a_start = integers(count + 1);
+    lu->a_source = integers((size_t)n_nonzeros);
+    lu->a_row = integers((size_t)n_nonzeros);
+    lu->l_start = integers(count + 1);
+    lu->u_start = integers(count + 1);
+    lu->pivot = gust_allocate(count, sizeof(double));
+    lu->pivot_inverse = gust_allocate(count, sizeof(double));
+    lu->row_scale = gust_allocate(count, sizeof(double));
+    lu->work = gust_allocate(count, sizeof(double));
+    return lu->row_of != NULL && lu->column_of != NULL && lu->a_start != NULL && lu->a_source != NULL &&
+           lu->a_row != NULL && lu->l_start != NULL && lu->u_start != NULL && lu->pivot != NULL &&
+           lu->pivot_inverse != NULL && lu->row_scale != NULL && lu->work != NULL;
+}
+
+static bool allocate_factors(gust_lu *lu, int32_t n_lower, int32_t n_upper)
+{
+    lu->l_row = integers((size_t)n_lower);
+    lu->l_column = integers((size_t)n_lower);
+    lu->l_value = gust_allocate((size_t)n_lower, sizeof(double));
+    lu->u_row = integers((size_t)n_upper);
+    lu->u_column = integers((size_t)n_upper);
+    lu->u_value = gust_allocate((size_t)n_upper, sizeof(double));
+    return lu->l_row != NULL && lu->l_column != NULL && lu->l_value != NULL && lu->u_row != NULL &&
+           lu->u_column != NULL && lu->u_value != NULL;
+}
+
+void gust_lu_free(gust_lu *lu)
+{
+    void *const blocks[] = {lu->row_of,    lu->column_of, lu->a_start, lu->a_source, lu->a_row,
+                            lu->l_start,   lu->u_start,   lu->l_row,   lu->l_column, lu->l_value,
+                            lu->u_row,     lu->u_column,  lu->u_value, lu->pivot,    lu->pivot_inverse,
+                            lu->row_scale, lu->work};
+    for (size_t k = 0; k < sizeof blocks / sizeof blocks[0]; ++k) {
+        gust_release(blocks[k]);
+    }
+    *lu = (gust_lu){0};
+}
+
+/* Which values of A go where, column by column in the order of pivots, and the size of each row. */
+static void take_sources(gust_lu *lu, const int32_t *column_start, const int32_t *row_index,
+                         const double *values, const int32_t *pivot_of_row)
+{
+    int32_t used = 0;
+    for (int32_t k = 0; k < lu->n; ++k) {
+        const int32_t column = lu->column_of[k];
+        lu->a_start[k] = used;
+        for (int32_t p = column_start[column]; p < column_start[column + 1]; ++p) {
+            const int32_t pivot = pivot_of_row[row_index[p]];
+            lu->a_source[used] = p;
+            lu->a_row[used++] = pivot;
+            lu->row_scale[pivot] = fmax(lu->row_scale[pivot], fabs(values[p]));
+        }
+    }
+    lu->a_start[lu->n] = used;
+    for (int32_t k = 0; k < lu->n; ++k) {
+        lu->row_scale[k] = lu->row_scale[k] > 0.0 ? 1.0 / lu->row_scale[k] : 1.0;
+    }
+}
+
+/* Lists that grow while the pattern of the factors is being found. */
+typedef struct growing {
+    int32_t *entry;
+    int32_t used;
+    int32_t room;
+} growing;
+
+static bool append(growing *list, int32_t entry)
+{
+    if (list->used == list->room) {
+        const int32_t room = list->room < 512 ? 1024 : list->room + list->room / 2;
+        int32_t *larger = room > list->room ? integers((size_t)room) : NULL;
+        if (larger == NULL) {
+            return false;
+        }
+        if (list->used > 0) {
+            memcpy(larger, list->entry, (size_t)list->used * sizeof *larger);
+        }
+        gust_release(list->entry);
+        list->entry = larger;
+        list->room = room;
+    }
+    list->entry[list->used++] = entry;
+    return true;
+}
+
+/* The pattern of one column of the factors: the rows of A, and those that eliminating them fills in. Rows
+ * above the diagonal wait in a heap, so that they are met in ascending order without looking at all of them. */
+typedef struct column_search {
+    int32_t *mark; /* [n] last column that met this row, + 1 */
+    int32_t *heap; /* rows still to be eliminated, smallest first */
+    int32_t n_heap;
+} column_search;
+
+static void push(column_search *search, int32_t row)
+{
+    int32_t at = search->n_heap++;
+    while (at > 0 && search->heap[(at - 1) / 2] > row) {
+        search->heap[at] = search->heap[(at - 1) / 2];
+        at = (at - 1) / 2;
+    }
+    search->heap[at] = row;
+}
+
+static int32_t pop(column_search *search)
+{
+    const int32_t smallest = search->heap[0];
+    const int32_t last = search->heap[--search->n_heap];
+    int32_t at = 0;
+    for (;;) {
+        int32_t child = 2 * at + 1;
+        if (child >= search->n_heap) {
+            break;
+        }
+        if (child + 1 < search->n_heap && search->heap[child + 1] < search->heap[child]) {
+            ++child;
+        }
+        if (search->heap[child] >= last) {
+            break;
+        }
+        search->heap[at] = search->heap[child];
+        at = child;
+    }
+    search->heap[at] = last;
+    return smallest;
+}
+
+static bool meet(column_search *search, int32_t row, int32_t k, growing *lower)
+{
+    if (search->mark[row] == k + 1) {
+        return true;
+    }
+    search->mark[row] = k + 1;
+    if (row < k) {
+        push(search, row);
+        return true;
+    }
+    return row == k || append(lower, row);
+}
+
+static bool find_column(const gust_lu *lu, int32_t k, column_search *search, growing *lower, growing *upper)
+{
+    bool good = true;
+    search->n_heap = 0;
+    for (int32_t p = lu->a_start[k]; p < lu->a_start[k + 1] && good; ++p) {
+        good = meet(search, lu->a_row[p], k, lower);
+    }
+    while (search->n_heap > 0 && good) {
+        const int32_t j = pop(search);
+        good = append(upper, j);
+        for (int32_t p = lu->l_start[j]; p < lu->l_start[j + 1] && good; ++p) {
+            good = meet(search, lower->entry[p], k, lower);
+        }
+    }
+    return good;
+}
+
+/* Moves the pattern found into the arrays a solve runs through. */
+static void arrange(gust_lu *lu, const growing *lower, const growing *upper, const int32_t *upper_start)
+{
+    const int32_t n = lu->n;
+    for (int32_t k = 0; k < n; ++k) {
+        for (int32_t p = lu->l_start[k]; p < lu->l_start[k + 1]; ++p) {
+            lu->l_row[p] = lower->entry[p];
+            lu->l_column[p] = k;
+        }
+    }
+    lu->u_start[n] = 0;
+    for (int32_t k = n - 1; k >= 0; --k) {
+        int32_t used = lu->u_start[k + 1];
+        for (int32_t p = upper_start[k + 1] - 1; p >= upper_start[k]; --p) {
+            lu->u_row[used] = upper->entry[p];
+            lu->u_column[used++] = k;
+        }
+        lu->u_start[k] = used;
+    }
+}
+
+static bool find_pattern(gust_lu *lu)
+{
+    const int32_t n = lu->n;
+    growing lower = {0};
+    growing upper = {0};
+    column_search search = {.mark = integers((size_t)n), .heap = integers((size_t)n)};
+    int32_t *upper_start = integers((size_t)n + 1);
+    bool good = search.mark != NULL && search.heap != NULL && upper_start != NULL;
+    for (int32_t k = 0; k < n && good; ++k) {
+        lu->l_start[k] = lower.used;
+        upper_start[k] = upper.used;
+        good = find_column(lu, k, &search, &lower, &upper);
+        lu->l_start[k + 1] = lower.used;
+        upper_start[k + 1] = upper.used;
+    }
+    good = good && allocate_factors(lu, lower.used, upper.used);
+    if (good) {
+        arrange(lu, &lower, &upper, upper_start);
+    }
+    gust_release(search.mark);
+    gust_release(search.heap);
+    gust_release(upper_start);
+    gust_release(lower.entry);
+    gust_release(upper.entry);
+    return good;
+}
+
+bool gust_lu_plan(gust_lu *lu, const int32_t *column_start, const int32_t *row_index, const double *values,
+                  klu_symbolic *symbolic, klu_numeric *numeric, klu_common *common)
+{
+    gust_lu_free(lu);
+    const int32_t n = numeric->n;
+    int32_t *pivot_of_row = integers((size_t)n);
+    bool good = pivot_of_row != NULL && allocate_pivots(lu, n, column_start[n]);
+    good = good && klu_extract(numeric, symbolic, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL,
+                               lu->row_of, lu->column_of, NULL, NULL, common) == 1;
+    if (good) {
+        for (int32_t k = 0; k < n; ++k) {
+            pivot_of_row[lu->row_of[k]] = k;
+        }
+        take_sources(lu, column_start, row_index, values, pivot_of_row);
+        good = find_pattern(lu);
+    }
+    gust_release(pivot_of_row);
+    if (!good) {
+        gust_lu_free(lu);
+    }
+    return good;
+}
+
+/* -- numbers -------------------------------------------------------------------------------------------- */
+
+bool gust_lu_factor(gust_lu *lu, const double *values)
+{
+    const int32_t n = lu->n;
+    const int32_t *restrict a_row = lu->a_row;
+    const int32_t *restrict a_source = lu->a_source;
+    const int32_t *restrict l_start = lu->l_start;
+    const int32_t *restrict l_row = lu->l_row;
+    const int32_t *restrict u_row = lu->u_row;
+    double *restrict l_value = lu->l_value;
+    double *restrict u_value = lu->u_value;
+    double *restrict work = lu->work;
+    for (int32_t k = 0; k < n; ++k) {
+        for (int32_t p = lu->a_start[k]; p < lu->a_start[k + 1]; ++p) {
+            work[a_row[p]] = values[a_source[p]];
+        }
+        /* Rows ascending: from the end of the column's entries, see gust_lu. */
+        for (int32_t u = lu->u_start[k] - 1; u >= lu->u_start[k + 1]; --u) {
+            const int32_t j = u_row[u];
+            const double factor = work[j];
+            work[j] = 0.0;
+            u_value[u] = factor * lu->pivot_inverse[j];
+            for (int32_t p = l_start[j]; p < l_start[j + 1]; ++p) {
+                work[l_row[p]] -= l_value[p] * factor;
+            }
+        }
+        const double pivot = work[k];
+        const double inverse = 1.0 / pivot;
+        work[k] = 0.0;
+        if (!(fabs(inverse) <= 1e300)) { /* also NaN */
+            lu->singular_pivot = k;
+            memset(work, 0, (size_t)n * sizeof *work);
+            return false;
+        }
+        lu->pivot[k] = pivot;
+        lu->pivot_inverse[k] = inverse;
+        for (int32_t p = l_start[k]; p < l_start[k + 1]; ++p) {
+            l_value[p] = work[l_row[p]] * inverse;
+            work[l_row[p]] = 0.0;
+        }
+    }
+    return true;
+}
+
+double gust_lu_growth(const gust_lu *lu, const double *values)
+{
+    double smallest = 1.0;
+    for (int32_t k = 0; k < lu->n; ++k) {
+        double largest_a = 0.0;
+        for (int32_t p = lu->a_start[k]; p < lu->a_start[k + 1]; ++p) {
+            largest_a = fmax(largest_a, fabs(values[lu->a_source[p]]) * lu->row_scale[lu->a_row[p]]);
+        }
+        double largest_u = fabs(lu->pivot[k]) * lu->row_scale[k];
+        for (int32_t u = lu->u_start[k + 1]; u < lu->u_start[k]; ++u) {
+            const int32_t j = lu->u_row[u];
+            largest_u = fmax(largest_u, fabs(lu->u_value[u] * lu->pivot[j]) * lu->row_scale[j]);
+        }
+        smallest = largest_u > 0.0 ? fmin(smallest, largest_a / largest_u) : 0.0;
+    }
+    return smallest;
+}
+
+void gust_lu_solve(gust_lu *lu, const double *right, double *solution)
+{
+    const int32_t n = lu->n;
+    double *restrict x = lu->work;
+    for (int32_t k = 0; k < n; ++k) {
+        x[k] = right[lu->row_of[k]];
+    }
+    /* One loop over all entries instead of one for each column: columns are so short that the loops
+     * themselves would take longer than what is in them. */
+    const int32_t n_lower = lu->l_start[n];
+    for (int32_t e = 0; e < n_lower; ++e) {
+        x[lu->l_row[e]] -= lu->l_value[e] * x[lu->l_column[e]];
+    }
+    for (int32_t k = 0; k < n; ++k) {
+        x[k] *= lu->pivot_inverse[k];
+    }
+    const int32_t n_upper = lu->u_start[0];
+    for (int32_t e = 0; e < n_upper; ++e) {
+        x[lu->u_row[e]] -= lu->u_value[e] * x[lu->u_column[e]];
+    }
+    for (int32_t k = 0; k < n; ++k) {
+        solution[lu->column_of[k]] = x[k];
+        x[k] = 0.0;
+    }
+}
