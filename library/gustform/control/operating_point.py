@@ -22,11 +22,14 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
 from gustform.aero.rotor import Rotor
 from gustform.language.errors import GustformError
 
-_SCAN = 601  # points of a scan that brackets a root; the curves have at most two bends in between
+Array = NDArray[np.float64]
+
+_SCAN = 241  # points of a scan that brackets a root: steps of about 0.05 in lambda or pitch, finer than any table
 _ON_TARGET = 1e-9  # of Cp: what a solution may miss
 _ROUND_OFF = 1e-12  # relative
 
@@ -102,17 +105,21 @@ class _Aerodynamics:
         self._best = ca.nlpsol("best", "ipopt", best, _OPTIONS)
         self._ratio = ca.nlpsol("ratio", "ipopt", ratio, _OPTIONS)
         self._pitch = ca.nlpsol("pitch", "ipopt", pitch, _OPTIONS)
+        self._scan = self.cp.map(_SCAN)
         self._mpp: dict[float, float] = {}
+        self._falling_ratio: dict[tuple[float, float], float | None] = {}
 
     def value(self, ratio: float, pitch: float) -> float:
         """Cp, with the arguments held inside their ranges as the rotor does."""
         return float(self.cp(_inside(ratio, self.ratios), _inside(pitch, self.pitches)))
 
-    def along_ratio(self, ratios: Any, pitch: float) -> Any:
-        return np.asarray(self.cp(ca.DM(ratios).T, ca.DM([[pitch] * len(ratios)]))).ravel()
+    def along_ratio(self, ratios: Array, pitch: float) -> Array:
+        """Cp at _SCAN tip speed ratios and one pitch angle."""
+        return np.asarray(self._scan(ratios[None, :], np.full((1, _SCAN), pitch))).ravel()
 
-    def along_pitch(self, ratio: float, pitches: Any) -> Any:
-        return np.asarray(self.cp(ca.DM([[ratio] * len(pitches)]), ca.DM(pitches).T)).ravel()
+    def along_pitch(self, ratio: float, pitches: Array) -> Array:
+        """Cp at one tip speed ratio and _SCAN pitch angles."""
+        return np.asarray(self._scan(np.full((1, _SCAN), ratio), pitches[None, :])).ravel()
 
     def mpp(self, pitch: float) -> float:
         """The tip speed ratio of the highest Cp at a pitch angle."""
@@ -124,15 +131,19 @@ class _Aerodynamics:
             self._mpp[pitch] = float(answer["x"])
         return self._mpp[pitch]
 
-    def falling_ratio(self, pitch: float, target: float, low: float, high: float) -> float | None:
-        """The tip speed ratio above `low` at which Cp falls to the target; None if it does not up to `high`."""
-        scan = np.linspace(low, high, _SCAN)
-        below = np.flatnonzero(self.along_ratio(scan, pitch) <= target)
-        below = below[below > 0]
-        if not below.size:
-            return None
-        k = int(below[0])
-        return self._root(self._ratio, float(scan[k - 1]), float(scan[k]), [pitch, target])
+    def falling_ratio(self, pitch: float, target: float) -> float | None:
+        """The tip speed ratio above the best one at which Cp falls to the target; None if it does not."""
+        key = (pitch, target)
+        if key not in self._falling_ratio:
+            scan = np.linspace(self.mpp(pitch), self.ratios[1], _SCAN)
+            below = np.flatnonzero(self.along_ratio(scan, pitch) <= target)
+            below = below[below > 0]
+            found = None
+            if below.size:
+                k = int(below[0])
+                found = self._root(self._ratio, float(scan[k - 1]), float(scan[k]), [pitch, target])
+            self._falling_ratio[key] = found
+        return self._falling_ratio[key]
 
     def falling_pitch(self, ratio: float, target: float, low: float) -> float | None:
         """The highest pitch angle at which Cp falls through the target; None if it stays above."""
@@ -183,6 +194,12 @@ def operating_point(rotor: Rotor, wind: float, curtailment: float, limits: Limit
     )
 
 
+def power_at(rotor: Rotor, wind: float, omega: float, beta: float, limits: Limits) -> float:
+    """Power, pu, at a wind speed (m/s), rotor speed (pu) and pitch angle (deg)."""
+    ratio = rotor.radius * limits.omega_base * omega / wind
+    return float(rotor.power_per_cube() * wind**3 * _aerodynamics_of(rotor).value(ratio, beta) / limits.rating)
+
+
 @lru_cache(maxsize=65536)
 def _operating_point(
     key: Hashable, radius: float, per_cube: float, wind: float, curtailment: float, limits: Limits
@@ -231,8 +248,7 @@ def _operating_point(
     omega_mpp = min(lambda_mpp / to_ratio, limits.omega_max)
     omega_del = omega_mpp
     if curtailment > 0.0 and omega_mpp < limits.omega_max:
-        highest = min(limits.omega_max * to_ratio, aero.ratios[1])
-        ratio = aero.falling_ratio(beta_min, eta * cp_max, lambda_mpp, highest)
+        ratio = aero.falling_ratio(beta_min, eta * cp_max)
         if ratio is None and limits.omega_max * to_ratio > aero.ratios[1]:
             most = 1.0 - aero.value(aero.ratios[1], beta_min) / cp_max
             raise GustformError(
@@ -268,23 +284,22 @@ def _operating_point(
 def dual_port_gains(point: OperatingPoint, K_gsc: float, reserve: float, K_msc_rated: float = 1.0) -> DualPortGains:
     """The largest gains that the operating point allows for a frequency deviation `reserve` (pu).
 
-        below rated:  K_msc = K_gsc (omega_del - omega_mpp) / reserve,   K_p = beta_del / (omega_del - omega_mpp)
-        above rated, or with no speed in reserve:  K_msc = K_msc_rated,   K_p = K_gsc beta_del / (K_msc reserve)
-        maximum power (eta = 1):  K_msc = K_gsc
-        m_p = K_gsc / (K_msc (K_wr + K_beta K_p))
+        K_msc = K_gsc (omega_del - omega_mpp) / reserve       below rated wind, but at least K_gsc
+        K_msc = K_msc_rated                                   above rated wind
+        K_msc = K_gsc                                         maximum power (eta = 1)
+        K_p   = K_gsc beta_del / (K_msc reserve)              below rated: beta_del / (omega_del - omega_mpp)
+        m_p   = K_gsc / (K_msc (K_wr + K_beta K_p))
 
-    K_msc_rated = 1 is the paper's choice, to keep the droop above 2 %.
+    K_msc_rated = 1 is the paper's choice, to keep the droop above 2 %. The lower bound K_gsc is ours: just below rated
+    wind the speed reserve vanishes, and K_p would grow without bound; K_gsc is what maximum power has anyway.
     Source: Lyu, Subotic, Gross 2022, eqs. (19)-(22); readings: project notes.
     """
-    speed = point.omega_del - point.omega_mpp
     if point.eta == 1.0:
         K_msc = K_gsc
-        K_p = K_gsc * point.beta_del / (K_msc * reserve)
-    elif point.wind < point.rated_wind and speed > 0.0:
-        K_msc = K_gsc * speed / reserve
-        K_p = point.beta_del / speed
+    elif point.wind < point.rated_wind:
+        K_msc = max(K_gsc * (point.omega_del - point.omega_mpp) / reserve, K_gsc)
     else:
         K_msc = K_msc_rated
-        K_p = K_gsc * point.beta_del / (K_msc * reserve)
+    K_p = K_gsc * point.beta_del / (K_msc * reserve)
     slope = point.K_wr + point.K_beta * K_p
     return DualPortGains(K_msc, K_p, K_gsc / (K_msc * slope) if slope > 0.0 else math.inf)

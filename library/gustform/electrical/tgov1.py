@@ -24,13 +24,13 @@ class TGOV1(Governor):
     T2 = Parameter("s", "lead time constant of the turbine", default=2.2, min=0.0)
     T3 = Parameter("s", "lag time constant of the turbine (reheater)", default=7.4, above=0.0)
     half_dead_band = Parameter("pu", "half width of the dead band on the speed", default=0.00105, min=0.0)
-    valve_min = Parameter("pu", "lower limit of the valve", default=0.0)
+    valve_min = Parameter("pu", "lower limit of the valve", default=0.0, min=0.0)
     valve_max = Parameter("pu", "upper limit of the valve", default=1.0)
     speed_start = Parameter("pu", "speed at a steady-state start", default=1.0, above=0.0)
     P_ref_start = Parameter("pu", "first guess of the power", default=0.4)
     P_ref = Parameter("pu", "power set point, found at the start", free=True, start=lambda self: self.P_ref_start)
 
-    valve = Variable("pu", "valve position g", start=lambda self: self.P_ref_start)
+    valve = Variable("pu", "valve position g", start=lambda self: self.P_ref_start, min=0.0)
     reheater = Variable("pu", "power after the reheater h", start=lambda self: self.P_ref_start)
 
     def equations(self) -> None:

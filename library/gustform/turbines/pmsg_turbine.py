@@ -12,6 +12,7 @@ from gustform.control.operating_point import (
     OperatingPoint,
     dual_port_gains,
     operating_point,
+    power_at,
 )
 from gustform.control.pitch import PitchControl
 from gustform.conventions import NOMINAL_FREQUENCY, active_power, reactive_power
@@ -128,14 +129,14 @@ class PmsgTurbine(Component):
         K_p=lambda self: self.K_p,
         omega_max=lambda self: self.omega_max,
         beta_min=lambda self: self.beta_min,
-        P_start=lambda self: self.operating_point().power,
+        P_start=lambda self: self.power_start(),
     )
 
     v_dc = Variable("pu", "DC voltage, base v_dc_base", start=1.0)
     omega_r = Variable("pu", "rotor speed, base omega_base", start=1.2)
     beta = Variable("deg", "pitch angle", nominal=10.0)
     frequency = Variable("Hz", "frequency of the GSC voltage", start=NOMINAL_FREQUENCY, nominal=NOMINAL_FREQUENCY)
-    P_wt = Variable("pu", "power from the wind, base rating", start=0.5)
+    P_wt = Variable("pu", "power from the wind, base rating", start=lambda self: self.power_start())
     P_pmsg = Variable("pu", "power from the machine into the MSC, base rating", start=0.5)
     P_gsc = Variable("pu", "active power out of the GSC, base rating", start=0.5)
     Q_gsc = Variable("pu", "reactive power out of the GSC, base rating")
@@ -144,10 +145,17 @@ class PmsgTurbine(Component):
     Q = Variable("var", "reactive power of all turbines, delivered at the port", nominal=1e6)
     omega_gsc = Output("pu", "frequency of the GSC voltage, base f0", start=1.0)
 
+    def limits(self) -> Limits:
+        """What bounds the operation of this turbine."""
+        return Limits(self.rating, self.omega_base, self.omega_max, self.beta_min, self.cut_in, self.cut_out)
+
     def operating_point(self) -> OperatingPoint:
         """Where this turbine works in a constant wind of `wind_speed`."""
-        limits = Limits(self.rating, self.omega_base, self.omega_max, self.beta_min, self.cut_in, self.cut_out)
-        return operating_point(self.rotor, self.wind_speed, self.control.curtailment, limits)
+        return operating_point(self.rotor, self.wind_speed, self.control.curtailment, self.limits())
+
+    def power_start(self) -> float:
+        """First guess of the power: that of the rotor at omega_del and beta_del, pu."""
+        return power_at(self.rotor, self.wind_speed, self.omega_del, self.beta_del, self.limits())
 
     def gains(self) -> DualPortGains:
         """The largest gains of dual-port control that the operating point allows."""
