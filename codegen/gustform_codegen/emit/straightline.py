@@ -86,6 +86,15 @@ def _c_expression(op: int, a: Sequence[str]) -> str:
     )
 
 
+def _small_power(text: str) -> int:
+    """The exponent if it is the literal of a whole number from 2 to 16, else 0."""
+    try:
+        value = float(text)
+    except ValueError:
+        return 0
+    return int(value) if value == int(value) and 2 <= value <= 16 else 0
+
+
 class Hoister:
     """Expressions of parameters alone, shared by all functions of a kernel; printed into `prepare`."""
 
@@ -183,6 +192,14 @@ class Printer:
             # A division by something constant is a multiplication by its hoisted reciprocal.
             arguments = [arguments[0], self._operation(ca.OP_INV, [arguments[1]])]
             op = ca.OP_MUL
+        if op in (ca.OP_POW, ca.OP_CONSTPOW) and (power := _small_power(arguments[1])):
+            # x^3 as products: a call of pow() costs more than a whole polynomial.
+            result = arguments[0]
+            for bit in bin(power)[3:]:
+                result = self._operation(ca.OP_SQ, [result])
+                if bit == "1":
+                    result = self._operation(ca.OP_MUL, [result, arguments[0]])
+            return result
         ordered = sorted(arguments) if op in _COMMUTATIVE else arguments
         key = (op, *ordered)
         if key in self._names:

@@ -1,0 +1,157 @@
+"""The peers: a bare IDA + KLU program in C, and CasADi's own `idas`, on the same condensed equations.
+
+Both get the flat system, the same start values, tolerances, wind samples and load step, and write no results.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from gustform_codegen.link import Linked
+from gustform_codegen.table import SystemTable
+from numpy.typing import NDArray
+
+from tests.support.flat import Flat, flatten_system, semi_explicit
+
+_HERE = Path(__file__).parent
+_C_FLAGS = ["-O3", "-march=native", "-w"]
+_LIBRARIES = [
+    "-lsundials_ida", "-lsundials_nvecserial", "-lsundials_sunlinsolklu", "-lsundials_sunmatrixsparse",
+    "-lsundials_generic", "-lklu", "-lamd", "-lcolamd", "-lbtf", "-lsuitesparseconfig", "-lm",
+]  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Wind:
+    """Uniform samples of every input slot: value[sample, slot], m/s."""
+
+    dt: float
+    value: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One run of a peer. `final` holds the unknowns at the end, to see that it solved the same problem."""
+
+    build_seconds: float
+    solve_seconds: float
+    steps: int
+    final: NDArray[np.float64]
+
+
+def _tolerances(table: SystemTable, rtol: float) -> NDArray[np.float64]:
+    """The absolute tolerances gustform uses: rtol times nominal."""
+    return rtol * table.nominal
+
+
+class BareProgram:
+    """Generates, compiles and runs the bare program."""
+
+    def __init__(self, linked: Linked, table: SystemTable, folder: Path) -> None:
+        begin = time.perf_counter()
+        self.table = table
+        self.flat: Flat = flatten_system(linked, table)
+        f = self.flat
+        cj = ca.SX.sym("cj")
+        jacobian = ca.jacobian(f.residual, f.y) + cj * ca.jacobian(f.residual, f.yp)
+        generator = ca.CodeGenerator("flat.c", {"with_header": True})
+        arguments = [f.y, f.yp, f.u, f.changing]
+        generator.add(ca.Function("residual_function", arguments, [f.residual], {"cse": True}))
+        generator.add(ca.Function("jacobian_function", [*arguments, cj], [ca.sparsify(jacobian)], {"cse": True}))
+        folder.mkdir(parents=True, exist_ok=True)
+        generator.generate(str(folder) + "/")
+        self.program = folder / "bare"
+        subprocess.run(
+            ["cc", *_C_FLAGS, f"-I{folder}", "-I/usr/include/suitesparse", str(_HERE / "bare.c"), str(folder / "flat.c"),
+             "-o", str(self.program), *_LIBRARIES],
+            check=True,
+        )  # fmt: skip
+        self.folder = folder
+        self.build_seconds = time.perf_counter() - begin
+
+    def run(self, wind: Wind, until: float, rtol: float) -> Measured:
+        """One run as a process of its own; the seconds are those of the integration alone."""
+        f, table = self.flat, self.table
+        numbers: list[float] = [
+            table.n_unknowns, table.input_value.size, len(f.changing_start), len(f.changes), rtol, until, wind.dt,
+            wind.value.shape[0],
+        ]  # fmt: skip
+        numbers += f.changing_start
+        for y, d, a in zip(table.start, table.differential, _tolerances(table, rtol), strict=True):
+            numbers += [float(y), float(d), float(a)]
+        for at, index, value in f.changes:
+            numbers += [at, index, value]
+        settings, wind_file = self.folder / "settings.txt", self.folder / "wind.f64"
+        settings.write_text("\n".join(repr(float(v)) for v in numbers))
+        np.ascontiguousarray(wind.value, dtype="<f8").tofile(wind_file)
+        run = subprocess.run(
+            [str(self.program), str(settings), str(wind_file)], check=True, capture_output=True, text=True
+        )
+        words = run.stdout.split()
+        return Measured(self.build_seconds, float(words[2]), int(words[0]), np.array([float(w) for w in words[3:]]))
+
+
+class CasadiIdas:
+    """CasADi's idas on the same equations, with the wind as a linear interpolant of time."""
+
+    def __init__(self, linked: Linked, table: SystemTable, wind: Wind, until: float, rtol: float, *, jit: bool) -> None:
+        self.table = table
+        begin = time.perf_counter()
+        self.flat = flatten_system(linked, table)
+        s = semi_explicit(self.flat, table.nominal)
+        self.s = s
+        right = ca.Function("right", [s.x, s.z, s.u, s.changing], [s.ode, s.alg], {"cse": True})
+        t = ca.MX.sym("t")
+        x, z = ca.MX.sym("x", s.x.numel()), ca.MX.sym("z", s.z.numel())
+        changing = ca.MX.sym("changing", s.changing.numel())
+        grid = np.arange(wind.value.shape[0]) * wind.dt
+        # lookup_mode exact: the grid is uniform, so the interval is found by a division.
+        speed = ca.interpolant("wind", "linear", [grid.tolist()], wind.value.ravel().tolist(), {"lookup_mode": ["exact"]})
+        ode, alg = right(x, z, speed(t), changing)
+        problem = {"x": x, "z": z, "t": t, "p": changing, "ode": ode, "alg": alg}
+        options: dict[str, Any] = {
+            "reltol": rtol,
+            "abstol": rtol,
+            "max_num_steps": 100_000_000,
+            "suppress_algebraic": True,
+            "calc_ic": True,
+        }
+        if jit:
+            options |= {
+                "jit": True,
+                "compiler": "shell",
+                "jit_options": {"flags": ["-O3", "-march=native"], "verbose": False},
+            }
+        self.pieces = [c[0] for c in self.flat.changes if c[0] < until]
+        edges = [0.0, *sorted(set(self.pieces)), until]
+        self.integrators = [
+            (a, b, ca.integrator("peer", "idas", problem, a, b, options)) for a, b in zip(edges, edges[1:], strict=False)
+        ]
+        self.build_seconds = time.perf_counter() - begin
+
+    def run(self) -> Measured:
+        """One run. CasADi has one absolute tolerance for all unknowns, so they are in units of their nominals."""
+        s = self.s
+        nominal = self.table.nominal
+        start = self.table.start / nominal
+        x, z = start[s.x_index], start[s.z_index]
+        changing = list(self.flat.changing_start)
+        steps = 0
+        begin = time.perf_counter()
+        for a, _, integrator in self.integrators:
+            for at, index, value in self.flat.changes:
+                if at == a:
+                    changing[index] = value
+            result = integrator(x0=x, z0=z, p=changing)
+            x, z = np.asarray(result["xf"]).ravel(), np.asarray(result["zf"]).ravel()
+            steps += int(integrator.stats().get("nsteps", 0))
+        seconds = time.perf_counter() - begin
+        final = np.zeros(self.table.n_unknowns)
+        final[s.x_index], final[s.z_index] = x, z
+        return Measured(self.build_seconds, seconds, steps, final * nominal)
