@@ -19,7 +19,7 @@ class DualPortGsc(Component):
 
     pu: base f0, nominal voltages, rating of the turbine; time in s; Q delivered. Q* is found at a steady-state start so
     that V = V*. Stable for T_dc < K_d/K_theta only (project notes): the published T_dc = 0.05 s is not.
-    Source: Lyu, Subotic, Gross 2022, eqs. (9), (10).
+    Source: Lyu, Subotic, Gross 2022, eqs. (7), (8).
     """
 
     omega_0 = Parameter("pu", "nominal frequency", default=1.0, above=0.0)

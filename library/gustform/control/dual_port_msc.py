@@ -13,7 +13,7 @@ class DualPortMsc(Component):
 
     with the states xi and Q_f as in DualPortGsc. pu: base of the rotor speed, nominal voltages, rating of the turbine;
     time in s; Q delivered to the machine. V* is found at a steady-state start so that the reactive power is Q* = 0.
-    Source: Lyu, Subotic, Gross 2022, eqs. (11a), (11b) with K_q^msc (project notes).
+    Source: Lyu, Subotic, Gross 2022, eqs. (9a), (9b) with K_q^msc (project notes).
     """
 
     omega_del = Parameter("pu", "rotor speed at the operating point", default=1.2, above=0.0)

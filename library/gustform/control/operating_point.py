@@ -9,7 +9,7 @@ what the speed limit leaves over by pitching. Above rated wind, eta means eta ti
     P(omega_del, beta_del) = eta min(P_mpp, P_rated)          upper root in beta, on the falling side
 
 Each of these is a bounded problem in one variable, bracketed by a scan and solved by Ipopt on the rotor's own Cp.
-Source: Lyu, Subotic, Gross 2022, IV-B, V-B; readings: project notes.
+Source: Lyu, Subotic, Gross 2022, IV-B, eqs. (5), (6); V-B; readings: project notes.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from gustform.language.errors import GustformError
 
 Array = NDArray[np.float64]
 
-_SCAN = 241  # points of a scan that brackets a root: steps of about 0.05 in lambda or pitch, finer than any table
+_SCAN = 241  # points of a scan that brackets a root: steps of about 0.05 in lambda or pitch, finer than any known table
 _ON_TARGET = 1e-9  # of Cp: what a solution may miss
 _ROUND_OFF = 1e-12  # relative
 
@@ -292,7 +292,7 @@ def dual_port_gains(point: OperatingPoint, K_gsc: float, reserve: float, K_msc_r
 
     K_msc_rated = 1 is the paper's choice, to keep the droop above 2 %. The lower bound K_gsc is ours: just below rated
     wind the speed reserve vanishes, and K_p would grow without bound; K_gsc is what maximum power has anyway.
-    Source: Lyu, Subotic, Gross 2022, eqs. (19)-(22); readings: project notes.
+    Source: Lyu, Subotic, Gross 2022, eqs. (17)-(20); readings: project notes.
     """
     if point.eta == 1.0:
         K_msc = K_gsc

@@ -14,7 +14,7 @@ class PiLimiter(Component):
 
     T_release is far below k_p/k_i, so the clamp acts only while the output is zero already. I starts at zero and keeps
     that value in a steady state. x in pu, u in deg (pitch demand).
-    Source: Lyu, Subotic, Gross 2022, IV-E, Fig. 8; clamp: tests/reference/README.md.
+    Source: Lyu, Subotic, Gross 2022, IV-E, Fig. 7; clamp: tests/reference/README.md.
     """
 
     x_max = Parameter("pu", "value above which the limiter acts", default=1.0)

@@ -16,7 +16,7 @@ class PitchControl(Component):
 
     and the servo behind it. Angles in deg; omega_r in pu of the turbine's base speed, P (electrical, from the machine)
     in pu of the rating of one turbine; time in s.
-    Source: Lyu, Subotic, Gross 2022, eq. (12), Fig. 8; gains of the limiters: project notes.
+    Source: Lyu, Subotic, Gross 2022, eq. (11), Fig. 7; gains of the limiters: project notes.
     """
 
     beta_del = Parameter("deg", "pitch angle at the operating point", default=0.0, min=0.0)
@@ -26,16 +26,15 @@ class PitchControl(Component):
     omega_max = Parameter("pu", "speed above which the speed limiter acts", default=1.2, above=0.0)
     P_max = Parameter("pu", "power above which the power limiter acts", default=1.0, above=0.0)
     T_P = Parameter("s", "time constant of the filter of the power", default=0.5, above=0.0)
-    P_start = Parameter("pu", "first guess of the power", default=0.5)
 
     speed_limiter = Part(PiLimiter, "limits the rotor speed", x_max=lambda self: self.omega_max, k_p=60.0, k_i=12.0)
     power_limiter = Part(PiLimiter, "limits the power", x_max=lambda self: self.P_max, k_p=1.0, k_i=2.0)
-    servo = Part(PitchServo, "pitch actuator", beta_start=lambda self: self.beta_del)
+    servo = Part(PitchServo, "pitch actuator", beta=lambda self: self.beta_del)
 
     omega_r = Input("pu", "rotor speed", start=1.2)
     P = Input("pu", "active power taken from the machine", start=0.5)
     beta = Output("deg", "pitch angle", nominal=10.0)
-    P_filtered = Variable("pu", "filtered power", start=lambda self: self.P_start)
+    P_filtered = Variable("pu", "filtered power", start=0.5)
     beta_ref = Variable("deg", "pitch demand", nominal=10.0)
 
     def equations(self) -> None:

@@ -10,15 +10,14 @@ class PitchServo(Component):
 
         d(beta)/dt = limit((beta_ref - beta)/T, -rate_max, rate_max)
 
-    deg, s. Source: Lyu, Subotic, Gross 2022, IV-E, Fig. 8; values: project notes.
+    deg, s. Source: Lyu, Subotic, Gross 2022, IV-E, Fig. 7; values: project notes.
     """
 
     T = Parameter("s", "time constant", default=0.3, above=0.0)
     rate_max = Parameter("deg/s", "largest pitch rate", default=8.0, above=0.0)
-    beta_start = Parameter("deg", "first guess of the pitch angle", default=0.0)
 
     beta_ref = Input("deg", "pitch demand", nominal=10.0)
-    beta = Output("deg", "pitch angle", start=lambda self: self.beta_start, nominal=10.0)
+    beta = Output("deg", "pitch angle", nominal=10.0)
 
     def equations(self) -> None:
         self.eq(self.der(self.beta), limit((self.beta_ref - self.beta) / self.T, -self.rate_max, self.rate_max))

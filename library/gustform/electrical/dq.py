@@ -26,7 +26,7 @@ class RotorFrame(Component):
         v_d + j v_q = v/V_n e^{-j(delta - pi/2)}        and the currents likewise, base I_b = n S_n / V_n
 
     delta: angle of the q axis against the real axis of the phasor frame. n identical machines are one in the d-q frame.
-    Source: Kundur, Power System Stability and Control, 1994, 3.6; Milano, Power System Modelling, 2010, 15.1.
+    Source: Kundur, Power System Stability and Control, 1994, 13.3.
     """
 
     rating = Parameter("VA", "rated apparent power S_n of one machine", default=210e6, above=0.0)

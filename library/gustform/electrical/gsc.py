@@ -19,7 +19,7 @@ class GridSideConverter(Component):
         v_dc i_dc = P
 
     Base: rating, nominal voltage. The filter's capacitor is left out at phasor fidelity. Ports in V and A.
-    Source: Lyu, Subotic, Gross 2022, II-B, eqs. (3), (9); filter .01 + j.1 pu: Table I and project notes.
+    Source: Lyu, Subotic, Gross 2022, II-B, eqs. (3), (7); filter .01 + j.1 pu: Table I and project notes.
     """
 
     rating = Parameter("VA", "base S_b of r and x", default=5e6, above=0.0)

@@ -11,7 +11,7 @@ from gustform.language import Component, Input, Output, Parameter, Variable
 
 
 @dataclass(frozen=True)
-class MachineStart:
+class MachineRest:
     """A machine at rest at nominal frequency: angle in rad, the rest in pu."""
 
     delta: float
@@ -50,7 +50,7 @@ class Machine6(Component):
     delta is the angle of the q axis against the phasor frame and keeps its start value in a steady state: the machine
     is the system's reference angle.
 
-    Source: Sauer and Pai, Power System Dynamics and Stability, 1998, eqs. (3.148)-(3.159); data: project notes, set A.
+    Source: Sauer and Pai, Power System Dynamics and Stability, 1998, chapter 3; data: project notes, set A.
     """
 
     f0 = Parameter("Hz", "nominal frequency", default=NOMINAL_FREQUENCY, above=0.0)
@@ -67,44 +67,34 @@ class Machine6(Component):
     Tq0_1 = Parameter("s", "open-circuit transient time constant T'q0", default=1.0, above=0.0)
     Td0_2 = Parameter("s", "open-circuit subtransient time constant T''d0", default=0.03, above=0.0)
     Tq0_2 = Parameter("s", "open-circuit subtransient time constant T''q0", default=0.07, above=0.0)
-    P_start = Parameter("pu", "first guess of the active power delivered", default=0.4)
-    Q_start = Parameter("pu", "first guess of the reactive power delivered", default=0.1)
-    V_start = Parameter("pu", "first guess of the terminal voltage", default=1.0, above=0.0)
-    angle_start = Parameter("rad", "first guess of the angle of the terminal voltage", default=0.0)
-    delta_start = Parameter(
-        "rad", "rotor angle at the start, which is the reference angle", default=lambda self: self.start().delta
-    )
 
-    P_m = Input("pu", "mechanical power, base the rating", start=lambda self: self.start().P_m)
-    E_fd = Input("pu", "field voltage; 1 gives rated voltage at no load", start=lambda self: self.start().E_fd)
+    P_m = Input("pu", "mechanical power, base the rating", start=0.4)
+    E_fd = Input("pu", "field voltage; 1 gives rated voltage at no load", start=1.3)
     frame = Input("pu", "speed of the phasor frame, base w0", start=1.0)
     stator = DqPort("stator terminals")
 
     omega = Output("pu", "rotor speed, base w0", start=1.0, min=0.5, max=1.5)
-    delta = Output(
-        "rad", "angle of the q axis against the phasor frame", start=lambda self: self.delta_start, fixed=True
-    )
-    E1q = Variable("pu", "E'q, transient voltage of the field winding", start=lambda self: self.start().E1q)
-    E1d = Variable("pu", "E'd, transient voltage of the q-axis damper", start=lambda self: self.start().E1d)
-    psi_1d = Variable("pu", "flux linkage of the d-axis damper", start=lambda self: self.start().psi_1d)
-    psi_2q = Variable("pu", "flux linkage of the second q-axis damper", start=lambda self: self.start().psi_2q)
-    psi_d = Variable("pu", "stator flux linkage, d axis", start=lambda self: self.start().psi_d)
-    psi_q = Variable("pu", "stator flux linkage, q axis", start=lambda self: self.start().psi_q)
-    i_d = Variable("pu", "stator current out of the machine, d axis", start=lambda self: self.start().i_d)
-    i_q = Variable("pu", "stator current out of the machine, q axis", start=lambda self: self.start().i_q)
-    T_e = Variable("pu", "air-gap power", start=lambda self: self.start().P_m)
+    delta = Output("rad", "angle of the q axis against the phasor frame", start=0.6, fixed=True)
+    E1q = Variable("pu", "E'q, transient voltage of the field winding", start=0.92)
+    E1d = Variable("pu", "E'd, transient voltage of the q-axis damper", start=0.34)
+    psi_1d = Variable("pu", "flux linkage of the d-axis damper", start=0.88)
+    psi_2q = Variable("pu", "flux linkage of the second q-axis damper", start=-0.5)
+    psi_d = Variable("pu", "stator flux linkage, d axis", start=0.89)
+    psi_q = Variable("pu", "stator flux linkage, q axis", start=-0.47)
+    i_d = Variable("pu", "stator current out of the machine, d axis", start=0.25)
+    i_q = Variable("pu", "stator current out of the machine, q axis", start=0.32)
+    T_e = Variable("pu", "air-gap power", start=0.4)
     V_t = Output("pu", "terminal voltage", start=1.0)
 
-    def start(self) -> MachineStart:
-        """The steady state at the first guess of P, Q and terminal voltage."""
-        v = cmath.rect(self.V_start, self.angle_start)
-        i = (complex(self.P_start, self.Q_start) / v).conjugate()
+    def rest(self, power: complex, voltage: complex) -> MachineRest:
+        """The machine at rest, delivering `power` at the terminal phasor `voltage` (pu)."""
+        v, i = voltage, (power / voltage).conjugate()
         delta = cmath.phase(v + complex(self.ra, self.xq) * i)
         turn = cmath.exp(-1j * (delta - cmath.pi / 2))  # network to d + jq
         v_d, v_q, i_d, i_q = (v * turn).real, (v * turn).imag, (i * turn).real, (i * turn).imag
         psi_d, psi_q = v_q + self.ra * i_q, -(v_d + self.ra * i_d)
         E1q, E1d = psi_d + self.xd1 * i_d, (self.xq - self.xq1) * i_q
-        return MachineStart(
+        return MachineRest(
             delta=delta,
             E1q=E1q,
             E1d=E1d,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from gustform.electrical.exciter import Exciter
-from gustform.language import Output, Parameter, Variable, limit
+from gustform.language import Parameter, Variable, limit
 
 
 class SEXS(Exciter):
@@ -24,16 +24,18 @@ class SEXS(Exciter):
     E_min = Parameter("pu", "lower limit of the field voltage", default=0.0)
     E_max = Parameter("pu", "upper limit of the field voltage", default=5.0)
     V_start = Parameter("pu", "terminal voltage at a steady-state start", default=1.0, above=0.0)
-    E_fd_start = Parameter("pu", "first guess of the field voltage", default=1.5)
     V_ref = Parameter(
         "pu",
         "voltage set point, found at the start",
         free=True,
-        start=lambda self: self.V_start + self.E_fd_start / self.K,
+        start=lambda self: self.V_start + self.lead_start(),
     )
 
-    E_fd = Output("pu", "field voltage; 1 gives rated voltage at no load", start=lambda self: self.E_fd_start)
-    lead = Variable("pu", "state of the lead-lag a", start=lambda self: self.E_fd_start / self.K, nominal=0.01)
+    lead = Variable("pu", "state of the lead-lag a", start=lambda self: self.lead_start(), nominal=0.01)
+
+    def lead_start(self) -> float:
+        """First guess of the lead-lag's state: the control error that gives the first guess of E_fd."""
+        return float(self.start_value(type(self).E_fd) / self.K)
 
     def equations(self) -> None:
         e = self.V_ref - self.V_t

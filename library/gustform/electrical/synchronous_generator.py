@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import cmath
-
 from gustform.conventions import NOMINAL_FREQUENCY, active_power, reactive_power
 from gustform.electrical.dq import DqImpedance, RotorFrame
 from gustform.electrical.exciter import Exciter
 from gustform.electrical.governor import Governor
-from gustform.electrical.machine6 import Machine6
+from gustform.electrical.machine6 import Machine6, MachineRest
 from gustform.electrical.sexs import SEXS
 from gustform.electrical.tgov1 import TGOV1
 from gustform.interfaces import AcPort
@@ -46,10 +44,15 @@ class SynchronousGenerator(Component):
         Machine6,
         "synchronous machine",
         f0=lambda self: self.f0,
-        P_start=lambda self: self.P_start,
-        Q_start=lambda self: self.Q_start,
-        V_start=lambda self: abs(self.terminal_start()),
-        angle_start=lambda self: cmath.phase(self.terminal_start()),
+        delta=lambda self: self.rest().delta,
+        E1q=lambda self: self.rest().E1q,
+        E1d=lambda self: self.rest().E1d,
+        psi_1d=lambda self: self.rest().psi_1d,
+        psi_2q=lambda self: self.rest().psi_2q,
+        psi_d=lambda self: self.rest().psi_d,
+        psi_q=lambda self: self.rest().psi_q,
+        i_d=lambda self: self.rest().i_d,
+        i_q=lambda self: self.rest().i_q,
     )
     transformer = Part(DqImpedance, "step-up transformer, pu of the machine's rating")
     rotor_frame = Part(
@@ -59,8 +62,15 @@ class SynchronousGenerator(Component):
         voltage=lambda self: self.voltage,
         n=lambda self: self.aggregate,
     )
-    governor = Part(TGOV1, "turbine and governor", base=Governor, P_ref_start=lambda self: self.machine.start().P_m)
-    exciter = Part(SEXS, "excitation system", base=Exciter, E_fd_start=lambda self: self.machine.start().E_fd)
+    governor = Part(
+        TGOV1,
+        "turbine and governor",
+        base=Governor,
+        P_ref=lambda self: self.rest().P_m,
+        valve=lambda self: self.rest().P_m,
+        reheater=lambda self: self.rest().P_m,
+    )
+    exciter = Part(SEXS, "excitation system", base=Exciter, E_fd=lambda self: self.rest().E_fd)
 
     omega = Output("pu", "rotor speed, base f0", start=1.0)
     frequency = Variable("Hz", "frequency of the machine", start=NOMINAL_FREQUENCY, nominal=NOMINAL_FREQUENCY)
@@ -71,10 +81,12 @@ class SynchronousGenerator(Component):
     E_fd = Variable("pu", "field voltage", start=1.5)
     V_t = Variable("pu", "voltage at the machine's terminals, below the transformer", start=1.0)
 
-    def terminal_start(self) -> complex:
-        """First guess of the voltage below the transformer, pu, with the bus at 1 pu and angle 0."""
-        i = complex(self.P_start, self.Q_start).conjugate()
-        return 1.0 + complex(self.transformer.r, self.transformer.x) * i
+    def rest(self) -> MachineRest:
+        """The machine at rest at the first guess of P and Q, with 1 pu and angle 0 at the terminal of the plant."""
+        power = complex(self.P_start, self.Q_start)
+        voltage = 1.0 + complex(self.transformer.r, self.transformer.x) * power.conjugate()
+        rest: MachineRest = self.machine.rest(power, voltage)
+        return rest
 
     def equations(self) -> None:
         machine = self.machine

@@ -27,11 +27,10 @@ class TGOV1(Governor):
     valve_min = Parameter("pu", "lower limit of the valve", default=0.0, min=0.0)
     valve_max = Parameter("pu", "upper limit of the valve", default=1.0)
     speed_start = Parameter("pu", "speed at a steady-state start", default=1.0, above=0.0)
-    P_ref_start = Parameter("pu", "first guess of the power", default=0.4)
-    P_ref = Parameter("pu", "power set point, found at the start", free=True, start=lambda self: self.P_ref_start)
+    P_ref = Parameter("pu", "power set point, found at the start", free=True, start=0.4)
 
-    valve = Variable("pu", "valve position g", start=lambda self: self.P_ref_start, min=0.0)
-    reheater = Variable("pu", "power after the reheater h", start=lambda self: self.P_ref_start)
+    valve = Variable("pu", "valve position g", start=0.4, min=0.0)
+    reheater = Variable("pu", "power after the reheater h", start=0.4)
 
     def equations(self) -> None:
         d = dead_band(self.omega - 1.0, self.half_dead_band)

@@ -16,10 +16,9 @@ class OneMass(Component):
     """
 
     J = Parameter("kg*m^2", "moment of inertia of everything that turns", default=35.328e6, above=0.0)
-    w_start = Parameter("1/s", "speed from which the start is sought, rad/s", default=1.3, above=0.0)
 
-    shaft = Shaft("the mass", start={"w": lambda self: self.w_start})
-    w = Variable("1/s", "speed, rad/s", start=lambda self: self.w_start, nominal=lambda self: self.w_start, min=0.0)
+    shaft = Shaft("the mass", start={"w": 1.3})
+    w = Variable("1/s", "speed, rad/s", start=1.3, min=0.0)
 
     def equations(self) -> None:
         self.eq(self.w, self.shaft.w)

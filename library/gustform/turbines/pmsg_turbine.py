@@ -80,7 +80,7 @@ class PmsgTurbine(Component):
     )
 
     rotor = Part(ClosedFormRotor, "aerodynamics", base=Rotor)
-    drive = Part(OneMass, "drive train", w_start=lambda self: self.omega_del * self.omega_base)
+    drive = Part(OneMass, "drive train", w=lambda self: self.omega_del * self.omega_base)
     pmsg = Part(
         Pmsg,
         "generator",
@@ -129,7 +129,7 @@ class PmsgTurbine(Component):
         K_p=lambda self: self.K_p,
         omega_max=lambda self: self.omega_max,
         beta_min=lambda self: self.beta_min,
-        P_start=lambda self: self.power_start(),
+        P_filtered=lambda self: self.power_start(),
     )
 
     v_dc = Variable("pu", "DC voltage, base v_dc_base", start=1.0)
