@@ -10,6 +10,7 @@ import shutil
 import stat
 import subprocess
 import sys
+import sysconfig
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
@@ -190,6 +191,35 @@ def test_each_package_is_typed_and_known_to_every_tool() -> None:
         assert (folder / "__init__.py").is_file(), name
         assert (folder / "py.typed").is_file(), name
         assert folder.parent.name in tools["mypy"]["files"]
+
+
+@pytest.mark.timeout(600)
+def test_the_wheel_holds_all_that_running_needs(tmp_path: Path) -> None:
+    built = run(
+        *(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation", "-w", tmp_path, "."),
+        timeout=500,
+    )
+    assert built.returncode == 0, built.stderr
+    (wheel,) = tmp_path.glob("*.whl")
+    site = tmp_path / "site"
+    installed = run(sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--target", site, wheel)
+    assert installed.returncode == 0, installed.stderr
+    program = "import gustform_runtime as r; print(r.library_path(), r.include_dir() / 'gustform/gust_kernel.h')"
+    # -S leaves the editable install out: its path entries would win.
+    found = subprocess.run(
+        [sys.executable, "-S", "-c", program],
+        cwd=tmp_path,
+        env=environment() | {"PYTHONPATH": os.pathsep.join([str(site), sysconfig.get_path("platlib")])},
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    paths = [Path(word) for word in found.stdout.split()]
+    assert len(paths) == 2, found.stderr
+    assert all(path.is_file() and path.is_relative_to(site) for path in paths)
+    assert run(site / "gustform_runtime" / "bin" / "gust-run", "--help").returncode == 0
+    assert list(site.glob("gustform_cli/scenarios/*.yaml"))
+    assert not list(site.glob("**/*.o"))
 
 
 def test_hooks_are_local_and_valid() -> None:
