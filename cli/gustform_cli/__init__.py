@@ -1,0 +1,1 @@
+"""The command `gustform`: from a YAML scenario to a result file and a figure."""

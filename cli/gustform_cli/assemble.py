@@ -1,0 +1,348 @@
+"""From a validated scenario to a System: components placed and connected, wind bound, events scheduled."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from gustform.language.component import Component
+from gustform.language.declare import Input, Parameter, Part
+from gustform.language.errors import GustformError
+from gustform.language.system import Series, System
+from gustform.registry import UNITS, Unit
+from gustform_cli.components import Reader, entries
+from gustform_cli.document import Document, NodePath, dotted
+from gustform_cli.errors import ErrorList, did_you_mean
+from gustform_cli.scenario import ComponentEntry, ConstantWind, FileWind, Scenario, TurbulentWindBlock, validate
+from gustform_cli.wind.source import Reader as SeriesReader
+from gustform_cli.wind.source import WindSource, constant, csv_file, turbulence
+
+# The signal and the part this layer knows by name.
+FRAME = "frame"
+ROTOR, RADIUS = "rotor", "radius"
+
+
+@dataclass
+class Assembled:
+    """A system with what the run needs beside it."""
+
+    scenario: Scenario
+    document: Document
+    system: System
+    counts: dict[str, int] = field(default_factory=dict)  # components that stand there several times
+    readers: dict[str, SeriesReader] = field(default_factory=dict)  # by the name of the series
+    frequency: str | None = None  # channel of the grid frequency
+
+    def instances(self, name: str) -> list[str]:
+        """The units a component's name stands for: wt, or wt[1], wt[2], ..."""
+        if name in self.counts:
+            return [f"{name}[{number}]" for number in range(1, self.counts[name] + 1)]
+        return [name]
+
+
+def assemble(document: Document) -> Assembled:
+    """The system a document describes. Raises ErrorList with everything that is wrong, in the order of the file."""
+    scenario, errors = validate(document)
+    try:
+        plain = document.plain()
+    except GustformError as error:
+        raise ErrorList([error]) from None
+    turbines = plain.get("turbines")
+    reader = Reader(document, turbines if isinstance(turbines, int) else None, errors)
+    listed = plain.get("components")
+    components = _components(reader, listed if isinstance(listed, dict) else {}, scenario)
+    if scenario is not None and not errors:
+        result = _Assembly(document, scenario, reader, components).run()
+        if not errors:
+            return result
+    raise ErrorList(sorted(errors, key=_position))
+
+
+def _components(reader: Reader, listed: Mapping[str, Any], scenario: Scenario | None) -> dict[str, Component]:
+    """The components without errors. What hangs at another comes after it, because its voltage follows."""
+    made: dict[str, Component] = {}
+    units = dict(entries(listed))
+    for hanging in (False, True):
+        for name, entry in units.items():
+            node = entry.get("at", entry.get("from"))
+            if isinstance(node, str) is hanging:
+                implied = {
+                    **_operating_wind(entry["type"], name, scenario),
+                    **_voltage(entry["type"], node, made, units),
+                }
+                component = reader.component(name, entry, implied)
+                if component is not None:
+                    made[name] = component
+    return {name: made[name] for name in units if name in made}
+
+
+def _operating_wind(kind: str, name: str, scenario: Scenario | None) -> dict[str, float]:
+    """The wind speed a turbine's operating point is made for, unless its entry says another: the mean of its wind."""
+    block = scenario.wind.get(name) if scenario is not None else None
+    if kind not in UNITS or UNITS[kind].wind_speed is None or block is None:
+        return {}
+    speed = block.speed if isinstance(block, ConstantWind) else getattr(block, "mean", None)
+    return {} if speed is None else {str(UNITS[kind].wind_speed): speed}
+
+
+def _voltage(
+    kind: str, node: str, made: Mapping[str, Component], units: Mapping[str, Mapping[str, Any]]
+) -> dict[str, float]:
+    """The nominal voltage of what hangs at a bus is that of the bus, unless its entry says another."""
+    if kind not in UNITS or UNITS[kind].voltage is None or node not in made:
+        return {}
+    source = UNITS[units[node]["type"]].voltage
+    return {} if source is None else {str(UNITS[kind].voltage): float(made[node].value(source))}
+
+
+def _position(error: GustformError) -> tuple[int, int]:
+    return (error.place.line, error.place.column) if error.place is not None else (0, 0)
+
+
+class _Assembly:
+    """The steps of `assemble` once everything in the file has a shape."""
+
+    def __init__(
+        self, document: Document, scenario: Scenario, reader: Reader, components: Mapping[str, Component]
+    ) -> None:
+        self.document, self.scenario, self.reader, self.components = document, scenario, reader, components
+        self.errors = reader.errors
+        self.result = Assembled(scenario, document, System())
+
+    def run(self) -> Assembled:
+        self._place_components()
+        self._connect_terminals()
+        self._connect_listed()
+        self._wire_frame()
+        self._bind_wind()
+        self._schedule_events()
+        return self.result
+
+    def _fail(self, code: str, path: NodePath, message: str, hint: str = "") -> None:
+        self.errors.append(GustformError(code, message, hint=hint, place=self.document.place(path)))
+
+    def _keep(self, error: GustformError, path: NodePath) -> None:
+        place = error.place or self.document.place(path)
+        self.errors.append(GustformError(error.code, error.message, hint=error.hint, place=place))
+
+    def _known(self, name: str, path: NodePath) -> bool:
+        if name in self.components:
+            return True
+        self._fail(
+            "GF2007",
+            path,
+            f"{dotted(path)} must be the name of a component; there is no {name!r}",
+            did_you_mean(name, self.components),
+        )
+        return False
+
+    def _unit(self, name: str) -> Unit:
+        return UNITS[self.scenario.components[name].type]
+
+    # ---- components and connections ---------------------------------------------------------------------------------
+    def _place_components(self) -> None:
+        for name, entry in self.scenario.components.items():
+            if entry.count is not None:
+                self.result.counts[name] = self.reader.many(entry.count, ("components", name, "count"))
+            for instance in self.result.instances(name):
+                # One object for all: what is the same is computed once.
+                self.result.system.add(instance, self.components[name])
+
+    def _connect_terminals(self) -> None:
+        for name, entry in self.scenario.components.items():
+            path: NodePath = ("components", name)
+            if entry.at is not None and (entry.from_ is not None or entry.to is not None):
+                self._fail(
+                    "GF2403",
+                    (*path, "at"),
+                    f"{dotted(path)} must have either at, or from and to; it has both",
+                    "at for what stands at one place, from and to for what lies between two",
+                )
+                continue
+            own = _terminals(UNITS[entry.type])
+            targets = [(key, target) for key, target in _targets(entry) if target is not None]
+            if targets and len(targets) != len(own):
+                wanted = {1: "at", 2: "from and to"}.get(len(own), "entries under connections")
+                self._fail(
+                    "GF2403",
+                    (*path, targets[0][0]),
+                    f"{dotted(path)} must be connected by {wanted}: {entry.type} has {_listed(own)}",
+                    f"{'; '.join(f'[{name}.{port}, bus.terminal]' for port in own)} under connections"
+                    if len(own) != 1
+                    else "at: bus",
+                )
+                continue
+            for port, (key, target) in zip(own, targets, strict=False):
+                where = (*path, key)
+                if not self._known(target.partition(".")[0], where):
+                    continue
+                other, _, other_port = target.partition(".")
+                if not other_port:
+                    ports = _terminals(self._unit(other))
+                    if len(ports) != 1:
+                        self._fail(
+                            "GF2403",
+                            where,
+                            f"{dotted(where)} must name a terminal: {other} has {_listed(ports)}",
+                            " or ".join(f"{other}.{one}" for one in ports) or "a bus",
+                        )
+                        continue
+                    other_port = ports[0]
+                self._connect(f"{name}.{port}", f"{other}.{other_port}", where)
+
+    def _connect_listed(self) -> None:
+        for index, (a, b) in enumerate(self.scenario.connections):
+            known = [self._known(_base(end), ("connections", index, side)) for side, end in enumerate((a, b))]
+            if all(known):
+                self._connect(a, b, ("connections", index))
+
+    def _connect(self, a: str, b: str, path: NodePath) -> None:
+        """Connect two ports; those of several components go one to one, or all to the one at the other end."""
+        ones, others = self._ends(a), self._ends(b)
+        if len(ones) > 1 and len(others) > 1 and len(ones) != len(others):
+            self._fail(
+                "GF2403",
+                path,
+                f"{dotted(path)} must join equal numbers; {a} stands for {len(ones)} and {b} for {len(others)}",
+                "the same count for both",
+            )
+            return
+        pairs = max(len(ones), len(others))
+        ones, others = ones * (pairs // len(ones)), others * (pairs // len(others))
+        try:
+            for one, other in zip(ones, others, strict=True):
+                self.result.system.connect(one, other)
+        except GustformError as error:
+            self._keep(error, path)
+
+    def _ends(self, port: str) -> list[str]:
+        name, _, rest = port.partition(".")
+        return [f"{instance}.{rest}" for instance in self.result.instances(name)]
+
+    # ---- signals, wind, events --------------------------------------------------------------------------------------
+    def _wire_frame(self) -> None:
+        frame = self.scenario.frame
+        needs = [name for name, component in self.components.items() if FRAME in component.declared(Input)]
+        if frame is None:
+            if needs:
+                self._fail(
+                    "GF2202",
+                    ("components", needs[0]),
+                    f"frame must be given, because {needs[0]} has an angle; it is missing",
+                    "frame: with the name of a synchronous generator",
+                )
+            return
+        if not self._known(frame, ("frame",)):
+            return
+        source = self.result.instances(frame)[0]
+        unit = self._unit(frame)
+        if unit.speed is None:
+            self._fail(
+                "GF2204",
+                ("frame",),
+                f"frame must be a machine, which has a speed; {frame} is a {type(self.components[frame]).__name__}",
+                " or ".join(name for name in self.components if self._unit(name).speed is not None),
+            )
+            return
+        self.result.system.frame(f"{source}.{unit.speed}")
+        if unit.frequency is not None:
+            self.result.frequency = f"{source}.{unit.frequency}"
+
+    def _bind_wind(self) -> None:
+        for name in self.components:
+            if self._unit(name).wind is not None and name not in self.scenario.wind:
+                self._fail(
+                    "GF2404",
+                    ("components", name),
+                    f"wind.{name} must be given; it is missing",
+                    f"wind: {{{name}: {{type: constant, speed: 8 m/s}}}}",
+                )
+        for name, block in self.scenario.wind.items():
+            path: NodePath = ("wind", name)
+            if not self._known(name, path):
+                continue
+            wind = self._unit(name).wind
+            if wind is None:
+                self._fail(
+                    "GF2404",
+                    path,
+                    f"{dotted(path)} must belong to a turbine; {self.scenario.components[name].type} takes no wind",
+                    " or ".join(other for other in self.components if self._unit(other).wind is not None),
+                )
+                continue
+            try:
+                shared = self._shared_source(name, block)
+                for number, instance in enumerate(self.result.instances(name), start=1):
+                    if isinstance(block, TurbulentWindBlock):
+                        source = turbulence(block, instance, number, self._radius(block, name))
+                    else:
+                        assert shared is not None
+                        source = shared
+                    self.result.system.bind(f"{instance}.{wind}", source.drive)
+                    if source.reader is not None and isinstance(source.drive, Series):
+                        self.result.readers[source.drive.name] = source.reader
+            except GustformError as error:
+                self._keep(error, path)
+
+    def _shared_source(self, name: str, block: ConstantWind | TurbulentWindBlock | FileWind) -> WindSource | None:
+        """The source that all instances of a component share; turbulence is made for each."""
+        if isinstance(block, ConstantWind):
+            return constant(block)
+        if isinstance(block, FileWind):
+            return csv_file(block, name, Path(self.document.file).parent, self.scenario.run.until)
+        return None
+
+    def _radius(self, block: TurbulentWindBlock, name: str) -> float:
+        """Rotor radius for the averaging, m."""
+        component = self.components[name]
+        if block.radius is not None or not block.rotor_effective:
+            return block.radius or 0.0
+        rotor = component.part(ROTOR) if ROTOR in component.declared(Part) else component
+        if RADIUS not in rotor.declared(Parameter):
+            raise GustformError(
+                "GF2202", f"wind.{name}.radius must be given; {name} does not tell it", hint="radius: 63 m"
+            )
+        return float(rotor.value(RADIUS))
+
+    def _schedule_events(self) -> None:
+        for index, event in enumerate(self.scenario.events):
+            for target, value in event.set.items():
+                path: NodePath = ("events", index, "set", target)
+                name, _, rest = target.partition(".")
+                if not self._known(_base(name), path):
+                    continue
+                if not rest:
+                    self._fail(
+                        "GF2405", path, f"{dotted(path)} must be component.parameter; got {target!r}", f"{target}.P"
+                    )
+                    continue
+                number = self.reader.parameter(self.components[_base(name)], rest, value, target, path)
+                if number is None:
+                    continue
+                instances = [name] if "[" in name else self.result.instances(name)
+                try:
+                    for instance in instances:
+                        self.result.system.change(event.at, f"{instance}.{rest}", number)
+                except GustformError as error:
+                    self._keep(error, path)
+
+
+def _targets(entry: ComponentEntry) -> list[tuple[str, str | None]]:
+    return [("at", entry.at), ("from", entry.from_), ("to", entry.to)]
+
+
+def _base(path: str) -> str:
+    """The component's name in wt.grid, wt[3].grid or wt[3]."""
+    return re.split(r"[.\[]", path, maxsplit=1)[0]
+
+
+def _terminals(unit: Unit) -> list[str]:
+    """The ports that `at`, or `from` and `to`, connect."""
+    return [unit.at] if unit.at is not None else list(unit.ends or ())
+
+
+def _listed(names: list[str]) -> str:
+    return f"the terminals {', '.join(names)}" if len(names) > 1 else f"the terminal {names[0]}" if names else "none"

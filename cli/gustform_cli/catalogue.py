@@ -1,0 +1,40 @@
+"""All component types that a scenario can say something about, for the schema and for `gustform info`."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+from gustform.language.component import Component
+from gustform.language.declare import Part
+from gustform.registry import ALIASES, PARTS, UNITS, fitting_parts
+
+
+@lru_cache(maxsize=1)
+def part_types() -> dict[str, type[Component]]:
+    """Types that stand inside units: those a scenario may choose, and the fixed ones whose parameters it may set."""
+    found: dict[str, type[Component]] = {name: entry.kind for name, entry in PARTS.items()}
+    waiting = [unit.kind for unit in UNITS.values()] + list(found.values())
+    while waiting:
+        for part in waiting.pop().declared(Part).values():
+            if part.kind.__name__ not in found:
+                found[part.kind.__name__] = part.kind
+                waiting.append(part.kind)
+    return dict(sorted(found.items()))
+
+
+def all_types() -> dict[str, type[Component]]:
+    """Units and parts by name."""
+    return dict(sorted({**part_types(), **{name: unit.kind for name, unit in UNITS.items()}}.items()))
+
+
+def choices(part: Part) -> list[str]:
+    """The types that may stand in the place of a part, its own first; short names left out."""
+    if part.base is None:
+        return [part.kind.__name__]
+    names = [name for name in fitting_parts(part) if name not in ALIASES]
+    return sorted(names, key=lambda name: (name != part.kind.__name__, name))
+
+
+def short_names(part: Part) -> list[str]:
+    """Short names for what may stand in the place of a part."""
+    return [name for name in fitting_parts(part) if name in ALIASES] if part.base is not None else []

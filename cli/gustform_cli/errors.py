@@ -1,0 +1,46 @@
+"""Errors of the scenario layer: several at once, with suggestions for misspelt names.
+
+Codes of this layer; the ranges are those of `gustform.language.errors`, and what the language refuses (GF2001 not a
+number, GF2002 not finite, GF2003 out of range, GF2004 not given, GF2006 name used twice, GF2007 no such component)
+keeps its code here.
+
+GF2101 file cannot be read      GF2201 unknown key           GF2012 unknown component type
+GF2102 not valid YAML           GF2202 key missing           GF2402 unknown parameter of a component
+GF2103 duplicate key            GF2203 wrong type            GF2403 terminals cannot be told
+GF2104 not plain data           GF2204 value not allowed     GF2404 wind does not fit the component
+GF2105 --set does not fit       GF2205 not a valid name      GF2405 event target does not exist
+GF2301 unit missing             GF2501 wind file missing     GF2406 no channel matches
+GF2302 another dimension        GF2502 wind file empty       GF2505 wind file: not a number
+GF2303 unit not understood      GF2503 no such column        GF2506 wind file does not cover the run
+                                GF2504 stamps not increasing
+GF7001 result folder not writable   GF7002 result cannot be read   GF7003 file exists already
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Sequence
+
+from gustform.language.errors import GustformError
+
+
+class ErrorList(Exception):
+    """Several errors found in one go; never empty."""
+
+    def __init__(self, errors: Sequence[GustformError]) -> None:
+        self.errors = tuple(errors)
+        super().__init__("\n".join(str(error) for error in self.errors))
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """A hint for `name`, which is none of `known`: the closest of them, or the list of them."""
+    names = sorted(set(known))
+    # Case first: "pmsgturbine" for "PmsgTurbine" is the commonest slip and difflib rates it low.
+    close = [other for other in names if other.lower() == name.lower()]
+    close = close or difflib.get_close_matches(name, names, n=2, cutoff=0.6)
+    if close:
+        return " or ".join(close)
+    if not names:
+        return ""
+    shown = names[:12]
+    return "one of " + ", ".join(shown) + (", ..." if len(names) > len(shown) else "")

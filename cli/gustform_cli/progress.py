@@ -1,0 +1,69 @@
+"""Progress of a run on stderr: a bar on a terminal, a line now and then where there is none."""
+
+from __future__ import annotations
+
+import sys
+import time
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.progress import Progress, TaskID
+
+_LINE_EVERY = 5.0  # s of waiting between lines
+
+
+class RunProgress:
+    """Shows simulated time, real-time factor and time left. Use as a context; `show` at any rate."""
+
+    def __init__(self, until: float) -> None:
+        self.until = until
+        self._begin = time.perf_counter()
+        self._last_line = self._begin
+        self._bar: Progress | None = None
+        self._task: TaskID | None = None
+
+    def __enter__(self) -> RunProgress:
+        if sys.stderr.isatty():
+            # Loaded here only: a run into a log file does without.
+            from rich.console import Console
+            from rich.progress import BarColumn, Progress, TextColumn
+
+            self._bar = Progress(
+                TextColumn("simulating"),
+                BarColumn(bar_width=None),
+                TextColumn("{task.fields[state]}"),
+                console=Console(stderr=True),
+                transient=True,
+            )
+            self._bar.start()
+            self._task = self._bar.add_task("", total=self.until, state="")
+        self._begin = self._last_line = time.perf_counter()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+
+    def show(self, simulated: float) -> None:
+        """Simulated time reached, s."""
+        now = time.perf_counter()
+        text = self.state(simulated, now - self._begin)
+        if self._bar is not None and self._task is not None:
+            self._bar.update(self._task, completed=simulated, state=text)
+        elif now - self._last_line >= _LINE_EVERY:
+            self._last_line = now
+            print(f"simulating: {text}", file=sys.stderr, flush=True)
+
+    def state(self, simulated: float, waited: float) -> str:
+        """ "12.0 / 90.0 s, 340 x real time, 0:02 left"."""
+        text = f"{simulated:.1f} / {self.until:.1f} s"
+        if simulated > 0.0 and waited > 0.0:
+            factor = simulated / waited
+            left = (self.until - simulated) / factor
+            hours, rest = divmod(round(left), 3600)
+            clock = f"{hours}:{rest // 60:02d}:{rest % 60:02d}" if hours else f"{rest // 60}:{rest % 60:02d}"
+            text += f", {factor:.3g} x real time, {clock} left"
+        return text

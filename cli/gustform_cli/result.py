@@ -1,0 +1,194 @@
+"""The result file: netCDF-4 (HDF5) written in blocks while the run goes on.
+
+Every channel is a variable over `time` with its unit and sentence; those of a component that stands there several
+times (`count`) share one variable over time and the component's number. The file is called result.nc.part until the
+run is over, completed or not, and is whole after every block: what a killed run leaves can be opened and plotted.
+
+The time dimension has an upper bound (the rows the run can give) instead of none: for unlimited dimensions h5netcdf
+asks all variables for their length, each time anybody asks one, which takes 40 s with 300 variables.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gustform.language.errors import GustformError
+
+if TYPE_CHECKING:
+    import h5py
+
+RESULT = "result.nc"
+PARTIAL = "result.nc.part"
+
+_CHUNK_BYTES = 16_384
+_INSTANCE = re.compile(r"(?P<component>[^.\[]+)\[(?P<number>\d+)\](?P<rest>\..*)")
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What is recorded: name, unit and sentence of one column of the rows."""
+
+    name: str
+    unit: str
+    description: str
+
+
+@dataclass(frozen=True)
+class _Variable:
+    """One variable of the file and the columns it takes, several if it has a dimension of its own."""
+
+    quantity: Quantity
+    columns: NDArray[np.intp]
+    dimension: str | None
+
+
+def arrange(quantities: Sequence[Quantity], counts: Mapping[str, int]) -> list[_Variable]:
+    """Variables for the columns. wt[1].x ... wt[n].x become wt.x over the dimension wt when all n are there."""
+    groups: dict[tuple[str, str], dict[int, int]] = {}
+    for column, quantity in enumerate(quantities):
+        if match := _INSTANCE.fullmatch(quantity.name):
+            groups.setdefault((match["component"], match["rest"]), {})[int(match["number"])] = column
+    whole = {
+        f"{component}{rest}": (component, columns)
+        for (component, rest), columns in groups.items()
+        if len(columns) == counts.get(component)
+    }
+    result: list[_Variable] = []
+    done: set[str] = set()
+    for column, quantity in enumerate(quantities):
+        match = _INSTANCE.fullmatch(quantity.name)
+        shared = f"{match['component']}{match['rest']}" if match else ""
+        if shared not in whole:
+            result.append(_Variable(quantity, np.array([column]), None))
+        elif shared not in done:
+            done.add(shared)
+            component, columns = whole[shared]
+            joined = Quantity(shared, quantity.unit, quantity.description)
+            result.append(_Variable(joined, np.array([columns[n] for n in sorted(columns)]), component))
+    return result
+
+
+def prepare_folder(folder: Path) -> None:
+    """Make the folder and see that files can be written into it. GF7001 before anything in it is touched."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise GustformError(
+            "GF7001",
+            f"the result folder {str(folder)!r} must be writable; {error.strerror or error}",
+            hint="--out with another folder",
+        ) from None
+
+
+class ResultWriter:
+    """Writes one result file. `append` may run in another thread than the rest, one at a time."""
+
+    def __init__(
+        self,
+        folder: Path,
+        quantities: Sequence[Quantity],
+        counts: Mapping[str, int],
+        most_rows: int,
+        attributes: Mapping[str, str],
+    ) -> None:
+        import h5py  # 0.2 s: not for `gustform --help`
+
+        self.path = folder / PARTIAL
+        self.rows = 0
+        self._final = folder / RESULT
+        self._variables = arrange(quantities, counts)
+        widest = max((v.columns.size for v in self._variables), default=1)
+        try:
+            # One chunk per variable in HDF5's cache: more would fill up with the length of the run.
+            self._file = h5py.File(self.path, "w", track_order=True, rdcc_nbytes=2 * max(_CHUNK_BYTES, 256 * widest))
+            self._create(attributes, most_rows)
+        except OSError as error:
+            raise _not_written(self.path, error) from None
+
+    def _create(self, attributes: Mapping[str, str], most_rows: int) -> None:
+        for name, text in {"Conventions": "CF-1.10", **attributes, "status": "running"}.items():
+            self._file.attrs[name] = text
+        self._time = self._scale("time", np.empty(0), most_rows)
+        self._time.attrs["units"] = "s"
+        self._time.attrs["long_name"] = "simulated time"
+        numbers: dict[str, h5py.Dataset] = {}
+        self._datasets: list[h5py.Dataset] = []
+        for variable in self._variables:
+            dimension, size = variable.dimension, variable.columns.size
+            if dimension is not None and dimension not in numbers:
+                numbers[dimension] = self._scale(dimension, np.arange(1, size + 1, dtype=np.int32), size)
+                numbers[dimension].attrs["long_name"] = f"number of the {dimension}"
+            rows = min(most_rows, int(np.clip(_CHUNK_BYTES // (4 * size), 64, 4096)))
+            tail = () if dimension is None else (size,)
+            dataset = self._file.create_dataset(
+                variable.quantity.name,
+                (0, *tail),
+                np.float32,
+                maxshape=(most_rows, *tail),
+                chunks=(rows, *tail),
+                compression="gzip",
+                compression_opts=1,
+                shuffle=True,
+            )
+            dataset.attrs["units"] = variable.quantity.unit
+            dataset.attrs["long_name"] = variable.quantity.description
+            dataset.dims[0].attach_scale(self._time)
+            if dimension is not None:
+                dataset.dims[1].attach_scale(numbers[dimension])
+            self._datasets.append(dataset)
+        self._file.flush()
+
+    def _scale(self, name: str, values: NDArray[Any], most: int) -> h5py.Dataset:
+        """A dimension with its coordinate variable."""
+        scale = self._file.create_dataset(
+            name, values.shape, values.dtype, data=values, maxshape=(most,), chunks=(min(most, 4096),)
+        )
+        scale.make_scale(name)
+        return scale
+
+    def append(self, times: NDArray[np.float64], rows: NDArray[np.float32]) -> None:
+        """Write a block, rows x columns, and see it to the disk. GF7001 when it cannot be (the disk is full)."""
+        end = self.rows + times.size
+        try:
+            self._time.resize((end,))
+            self._time[self.rows : end] = times
+            for variable, dataset in zip(self._variables, self._datasets, strict=True):
+                block = rows[:, variable.columns] if variable.dimension else rows[:, variable.columns[0]]
+                dataset.resize((end, *dataset.shape[1:]))
+                dataset[self.rows : end] = block
+            self._file.flush()
+        except OSError as error:
+            raise _not_written(self.path, error) from None
+        self.rows = end
+
+    def finish(self, status: str, statistics: Mapping[str, Any]) -> Path:
+        """Write how the run ended, close the file and give it its name. Returns the path it has then."""
+        try:
+            self._file.attrs["status"] = status
+            self._file.attrs["statistics"] = json.dumps(statistics)
+            self._file.close()
+            with self.path.open("rb") as written:
+                os.fsync(written.fileno())
+            self.path.replace(self._final)
+        except OSError as error:
+            raise _not_written(self.path, error) from None
+        return self._final
+
+
+def _not_written(path: Path, error: OSError) -> GustformError:
+    reason = error.strerror or str(error).splitlines()[0]
+    return GustformError(
+        "GF7001", f"the result {str(path)!r} cannot be written; {reason}", hint="--out with a folder that has space"
+    )

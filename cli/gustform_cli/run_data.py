@@ -1,0 +1,98 @@
+"""A result file read back for figures: a few channels, thinned to what a figure can show."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gustform.language.errors import GustformError
+
+if TYPE_CHECKING:
+    import h5py
+
+_MOST_POINTS = 6000  # along time; a figure has some 1500 pixels
+_BLOCK_ROWS = 65_536
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One channel over time, (rows,) or (rows, instances)."""
+
+    name: str
+    unit: str
+    description: str
+    values: NDArray[np.float64]
+
+
+class RunData:
+    """An open result file; use as a context. GF7002 for a file that is none."""
+
+    def __init__(self, file: Path) -> None:
+        import h5py
+
+        self.path = file
+        try:
+            self._file = h5py.File(file, "r")
+        except OSError as error:
+            reason = error.strerror or str(error).split("(")[0].strip()
+            raise _not_a_result(file, f"it cannot be opened: {reason}") from None
+        if "time" not in self._file or "scenario" not in self._file.attrs:
+            self._file.close()
+            raise _not_a_result(file, "it has no time or no scenario")
+        rows = self._file["time"].shape[0]
+        if rows < 2:
+            self._file.close()
+            raise _not_a_result(file, f"it has {rows} rows")
+        self._step = max(1, -(-rows // _MOST_POINTS))
+        self.time = self._read(self._file["time"])
+
+    def __enter__(self) -> RunData:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._file.close()
+
+    def attribute(self, name: str) -> str:
+        """A text attribute, "" if it is not there."""
+        return str(self._file.attrs.get(name, ""))
+
+    def json(self, name: str) -> Any:
+        """An attribute that holds JSON, None if it is not there."""
+        text = self.attribute(name)
+        return json.loads(text) if text else None
+
+    def names(self) -> list[str]:
+        """All channels, in the order of the file."""
+        return [name for name, data in self._file.items() if name != "time" and "time" in _dimensions(data)]
+
+    def curve(self, name: str) -> Curve:
+        """A channel, every so many rows of it."""
+        data = self._file[name]
+        return Curve(name, str(data.attrs.get("units", "")), str(data.attrs.get("long_name", "")), self._read(data))
+
+    def _read(self, data: h5py.Dataset) -> NDArray[np.float64]:
+        # Block by block: a slice with a step is slow in HDF5, the whole may be large.
+        parts = []
+        begin = 0
+        while begin < data.shape[0]:
+            block = data[begin : begin + _BLOCK_ROWS - _BLOCK_ROWS % self._step]
+            parts.append(block[:: self._step].astype(np.float64))
+            begin += block.shape[0]
+        return np.concatenate(parts)
+
+
+def _dimensions(data: h5py.Dataset) -> list[str]:
+    return [scale.name.lstrip("/") for dimension in data.dims for scale in dimension.values()]
+
+
+def _not_a_result(file: Path, reason: str) -> GustformError:
+    return GustformError(
+        "GF7002",
+        f"{str(file)!r} must be a result of gustform with rows in it; {reason}",
+        hint="the result.nc of a run",
+    )

@@ -1,0 +1,71 @@
+"""summary.json: how a run ended and what it cost, for people and programs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+# Counters of the runtime that everybody's summary has; zero when the run never began.
+_COUNTERS = (
+    "steps",
+    "residual_evaluations",
+    "jacobian_evaluations",
+    "factorisations",
+    "error_test_failures",
+)
+_MORE = (
+    "refactorisations",
+    "nonlinear_iterations",
+    "nonlinear_failures",
+    "root_evaluations",
+    "events",
+    "restarts",
+    "initial_iterations",
+    "rows",
+)
+
+
+def solver_figures(statistics: Mapping[str, int | float]) -> dict[str, int]:
+    """The counters of the runtime that go into the summary."""
+    figures = {name: int(statistics.get(name, 0)) for name in _COUNTERS}
+    figures.update({name: int(statistics[name]) for name in _MORE if name in statistics})
+    return figures
+
+
+@dataclass(frozen=True)
+class Summary:
+    """status: completed, interrupted or failed. Times in s; `frequency` only where there is a grid frequency."""
+
+    status: str
+    message: str | None
+    simulated_seconds: float
+    wall_seconds: float
+    build_seconds: float
+    compiled_types: int
+    unknowns: int
+    solver: dict[str, int] = field(default_factory=dict)
+    frequency: dict[str, float | None] | None = None
+
+    @property
+    def real_time_factor(self) -> float:
+        """Simulated over waited time."""
+        return self.simulated_seconds / self.wall_seconds if self.wall_seconds > 0.0 else 0.0
+
+    def as_dict(self) -> dict[str, Any]:
+        """The keys of summary.json, flat but for `frequency`."""
+        result: dict[str, Any] = {
+            "status": self.status,
+            "simulated_seconds": self.simulated_seconds,
+            "wall_seconds": self.wall_seconds,
+            "real_time_factor": self.real_time_factor,
+            "build_seconds": self.build_seconds,
+            "compiled_types": self.compiled_types,
+            "unknowns": self.unknowns,
+            **self.solver,
+        }
+        if self.frequency is not None:
+            result["frequency"] = self.frequency
+        if self.message is not None:
+            result["message"] = self.message
+        return result
