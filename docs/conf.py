@@ -4,9 +4,13 @@ import re
 from pathlib import Path
 
 from docutils import nodes
+from docutils.parsers.rst import Directive
 from latex2mathml.converter import convert
 from sphinx.application import Sphinx
 from sphinx.writers.html5 import HTML5Translator
+
+from gustform_cli.catalogue import all_types
+from gustform_cli.info import describe
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -40,5 +44,22 @@ def visit_math(self: HTML5Translator, node: nodes.Element) -> None:
     raise nodes.SkipNode
 
 
+class ComponentReference(Directive):
+    """A section for each component type with what `gustform info` prints: the declarations are the one source."""
+
+    def run(self) -> list[nodes.Node]:
+        return [self.section(name, describe(name)) for name in all_types()]
+
+    @staticmethod
+    def section(name: str, text: str) -> nodes.Node:
+        # The title and its underline are already there as the section's own.
+        body = "\n".join(text.splitlines()[2:])
+        section = nodes.section(ids=[nodes.make_id(name)], names=[nodes.fully_normalize_name(name)])
+        section += nodes.title(text=name)
+        section += nodes.literal_block(body, body, language="text")
+        return section
+
+
 def setup(app: Sphinx) -> None:
+    app.add_directive("component-reference", ComponentReference)
     app.add_html_math_renderer("mathml", inline_renderers=(visit_math, None), block_renderers=(visit_math, None))
