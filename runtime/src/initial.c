@@ -11,7 +11,8 @@ gust_status gust_initial_create(gust_initial *initial, gust_system *system, cons
                                 klu_symbolic *symbolic, const klu_common *common)
 {
     const gust_model *model = system->model;
-    const size_t n = (size_t)model->n_unknowns;
+    /* Rounded up as gust_lu_solve wants it. */
+    const size_t n = ((size_t)model->n_unknowns + GUST_LU_LANES - 1) / GUST_LU_LANES * GUST_LU_LANES;
     const size_t n_nonzeros = (size_t)model->n_nonzeros;
     *initial = (gust_initial){.system = system, .options = options};
     gust_factors_start(&initial->factors, model->n_unknowns, model->column_start, model->row_index, symbolic,

@@ -27,6 +27,13 @@ static bool allocate_pivots(gust_lu *lu, int32_t n, int32_t n_nonzeros)
     lu->pivot_inverse = gust_allocate(count, sizeof(double));
     lu->row_scale = gust_allocate(count, sizeof(double));
     lu->work = gust_allocate(count, sizeof(double));
+    if (n <= GUST_LU_DENSE) {
+        lu->padded = (n + GUST_LU_LANES - 1) / GUST_LU_LANES * GUST_LU_LANES;
+        lu->inverse = gust_allocate(count * (size_t)lu->padded, sizeof(double));
+        if (lu->inverse == NULL) {
+            return false;
+        }
+    }
     return lu->row_of != NULL && lu->column_of != NULL && lu->a_start != NULL && lu->a_source != NULL &&
            lu->a_row != NULL && lu->l_start != NULL && lu->u_start != NULL && lu->pivot != NULL &&
            lu->pivot_inverse != NULL && lu->row_scale != NULL && lu->work != NULL;
@@ -49,7 +56,7 @@ void gust_lu_free(gust_lu *lu)
     void *const blocks[] = {lu->row_of,    lu->column_of, lu->a_start, lu->a_source, lu->a_row,
                             lu->l_start,   lu->u_start,   lu->l_row,   lu->l_column, lu->l_value,
                             lu->u_row,     lu->u_column,  lu->u_value, lu->pivot,    lu->pivot_inverse,
-                            lu->row_scale, lu->work};
+                            lu->row_scale, lu->work,      lu->inverse};
     for (size_t k = 0; k < sizeof blocks / sizeof blocks[0]; ++k) {
         gust_release(blocks[k]);
     }
@@ -258,6 +265,8 @@ bool gust_lu_factor(gust_lu *lu, const double *values)
     double *restrict l_value = lu->l_value;
     double *restrict u_value = lu->u_value;
     double *restrict work = lu->work;
+    lu->solves = 0;
+    lu->inverted = false;
     for (int32_t k = 0; k < n; ++k) {
         for (int32_t p = lu->a_start[k]; p < lu->a_start[k + 1]; ++p) {
             work[a_row[p]] = values[a_source[p]];
@@ -308,7 +317,108 @@ double gust_lu_growth(const gust_lu *lu, const double *values)
     return smallest;
 }
 
-void gust_lu_solve(gust_lu *lu, const double *right, double *solution)
+/* Eight doubles that are worked on together, whatever the machine makes of them. */
+typedef double lanes __attribute__((vector_size(GUST_LU_LANES * sizeof(double)), may_alias));
+
+static inline void subtract(lanes *target, double factor, const lanes *source, int32_t n_lanes)
+{
+    for (int32_t v = 0; v < n_lanes; ++v) {
+        target[v] -= factor * source[v];
+    }
+}
+
+/* The columns of A^-1 are the rows of A^-T: A^T z = Q U^T D L^T P z = e is solved for all unit vectors e at
+ * once, element by element of z, so that each operation is one on a whole row. */
+static void invert(gust_lu *lu)
+{
+    const int32_t n = lu->n;
+    const int32_t n_lanes = lu->padded / GUST_LU_LANES;
+    lanes *rows = (lanes *)(void *)lu->inverse;
+    memset(lu->inverse, 0, (size_t)n * (size_t)lu->padded * sizeof(double));
+    for (int32_t k = 0; k < n; ++k) {
+        lu->inverse[(int64_t)k * lu->padded + lu->column_of[k]] = 1.0;
+    }
+    for (int32_t e = lu->u_start[0] - 1; e >= 0; --e) {
+        subtract(rows + (int64_t)lu->u_column[e] * n_lanes, lu->u_value[e],
+                 rows + (int64_t)lu->u_row[e] * n_lanes, n_lanes);
+    }
+    for (int32_t k = 0; k < n; ++k) {
+        lanes *row = rows + (int64_t)k * n_lanes;
+        for (int32_t v = 0; v < n_lanes; ++v) {
+            row[v] *= lu->pivot_inverse[k];
+        }
+    }
+    for (int32_t e = lu->l_start[n] - 1; e >= 0; --e) {
+        subtract(rows + (int64_t)lu->l_column[e] * n_lanes, lu->l_value[e],
+                 rows + (int64_t)lu->l_row[e] * n_lanes, n_lanes);
+    }
+    lu->inverted = true;
+}
+
+/* Sum of columns, all of whose elements stay in registers. */
+__attribute__((always_inline)) static inline void multiply(const gust_lu *lu, const double *right,
+                                                           double *solution, const int n_lanes)
+{
+    const lanes *column = (const lanes *)(const void *)lu->inverse;
+    /* Two sums, so that an addition need not wait for the one before it. */
+    lanes even[GUST_LU_DENSE / GUST_LU_LANES];
+    lanes odd[GUST_LU_DENSE / GUST_LU_LANES];
+    for (int v = 0; v < n_lanes; ++v) {
+        even[v] = (lanes){0.0};
+        odd[v] = (lanes){0.0};
+    }
+    int32_t k = 0;
+    for (; k + 1 < lu->n; k += 2, column += 2 * n_lanes) {
+        const double first = right[lu->row_of[k]];
+        const double second = right[lu->row_of[k + 1]];
+        for (int v = 0; v < n_lanes; ++v) {
+            even[v] += column[v] * first;
+            odd[v] += column[n_lanes + v] * second;
+        }
+    }
+    if (k < lu->n) {
+        const double last = right[lu->row_of[k]];
+        for (int v = 0; v < n_lanes; ++v) {
+            even[v] += column[v] * last;
+        }
+    }
+    for (int v = 0; v < n_lanes; ++v) {
+        even[v] += odd[v];
+    }
+    memcpy(solution, even, (size_t)n_lanes * sizeof *even);
+}
+
+static void apply_inverse(const gust_lu *lu, const double *right, double *solution)
+{
+    switch (lu->padded / GUST_LU_LANES) {
+    case 1:
+        multiply(lu, right, solution, 1);
+        break;
+    case 2:
+        multiply(lu, right, solution, 2);
+        break;
+    case 3:
+        multiply(lu, right, solution, 3);
+        break;
+    case 4:
+        multiply(lu, right, solution, 4);
+        break;
+    case 5:
+        multiply(lu, right, solution, 5);
+        break;
+    case 6:
+        multiply(lu, right, solution, 6);
+        break;
+    case 7:
+        multiply(lu, right, solution, 7);
+        break;
+    default:
+        multiply(lu, right, solution, 8);
+        break;
+    }
+}
+
+static void solve_triangular(const gust_lu *lu, const double *right, double *solution)
 {
     const int32_t n = lu->n;
     double *restrict x = lu->work;
@@ -331,5 +441,21 @@ void gust_lu_solve(gust_lu *lu, const double *right, double *solution)
     for (int32_t k = 0; k < n; ++k) {
         solution[lu->column_of[k]] = x[k];
         x[k] = 0.0;
+    }
+}
+
+void gust_lu_solve(gust_lu *lu, const double *right, double *solution)
+{
+    if (lu->inverse == NULL) {
+        solve_triangular(lu, right, solution);
+        return;
+    }
+    if (!lu->inverted && ++lu->solves > GUST_LU_PATIENCE) {
+        invert(lu);
+    }
+    if (lu->inverted) {
+        apply_inverse(lu, right, solution);
+    } else {
+        solve_triangular(lu, right, solution);
     }
 }

@@ -5,6 +5,12 @@
  * klu_solve, whose general storage, divisions and scaling cost more than the arithmetic. With fixed pivots
  * the rounding errors do not depend on the scaling of rows, so none is done. Columns are eliminated one
  * after the other, each by those before it ("left-looking").
+ *
+ * A triangular solve is one long chain of dependent operations. Where n is small and the factors serve many
+ * solves (a step needs little more than one, a Jacobian holds for a hundred steps), the inverse is worked
+ * out once and applied as a dense product, several times as fast. Its error is of the size of that of the
+ * triangular solves (N. J. Higham, Accuracy and Stability of Numerical Algorithms, SIAM 2002, ch. 14), and it
+ * serves Newton corrections only.
  * Source: T. A. Davis, E. Palamadai Natarajan, Algorithm 907: KLU, ACM TOMS 37 (2010). */
 #ifndef GUSTFORM_LU_H
 #define GUSTFORM_LU_H
@@ -12,6 +18,12 @@
 #include <klu.h>
 #include <stdbool.h>
 #include <stdint.h>
+
+enum {
+    GUST_LU_LANES = 8,   /* elements that one vector instruction takes */
+    GUST_LU_DENSE = 64,  /* largest system of which the inverse is used */
+    GUST_LU_PATIENCE = 3 /* solves before the inverse is worked out, which costs about as many */
+};
 
 typedef struct gust_lu {
     int32_t n;
@@ -37,6 +49,11 @@ typedef struct gust_lu {
     double *row_scale;      /* [n] 1 / largest entry of the row when the pivots were chosen */
     double *work;           /* [n], zero between calls of gust_lu_factor */
     int32_t singular_pivot; /* pivot number at which the last factorisation failed */
+    /* small systems: A^-1 by columns, [n] columns of `padded` elements in the order of pivots */
+    int32_t padded;
+    int32_t solves;  /* with the present factors */
+    bool inverted;   /* inverse holds for the present factors */
+    double *inverse; /* NULL if the system is not small */
 } gust_lu;
 
 /* Takes the pivots from KLU's factors of A and works out the pattern; the values are still to be set.
@@ -52,7 +69,8 @@ bool gust_lu_factor(gust_lu *lu, const double *values);
  * entry of U), rows scaled. 1 is perfect, 1e-16 leaves no correct digit. */
 double gust_lu_growth(const gust_lu *lu, const double *values);
 
-/* solution = A^-1 right; the two may be one array. */
+/* solution = A^-1 right; both [n rounded up to GUST_LU_LANES], or shorter only if n is larger than
+ * GUST_LU_DENSE; the two may be one array. Elements beyond n of the solution are set to 0. */
 void gust_lu_solve(gust_lu *lu, const double *right, double *solution);
 
 #endif

@@ -199,8 +199,8 @@ static void compare(sunrealtype c, N_Vector x, N_Vector z)
     }
 }
 
-/* Sums run in GUST_VECTOR_BLOCK lanes that are added in a fixed order: the compiler may use vector
- * instructions without being allowed to reorder, and every machine gets the same result. */
+/* Sums run in GUST_VECTOR_BLOCK lanes that are added in a fixed order, so that the compiler may use vector
+ * instructions without being allowed to reorder sums. */
 
 static inline double sum_of_lanes(const double *lane)
 {
