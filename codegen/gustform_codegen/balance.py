@@ -33,23 +33,38 @@ def check_balance(name: str, texts: list[str], labels: list[str], incidence: lis
 
 
 def refuse_singular(
-    name: str, texts: list[str], labels: list[str], incidence: list[frozenset[int]], matching: Matching
+    name: str,
+    texts: list[str],
+    labels: list[str],
+    incidence: list[frozenset[int]],
+    matching: Matching,
+    states: list[list[str]],
 ) -> NoReturn:
-    """GF3012 or GF3013: as many equations as unknowns, but no matching between them."""
+    """GF3012 or GF3013: as many equations as unknowns, but no matching between them.
+
+    `states` are the states in each equation: where the surplus equations contain states whose derivatives have no
+    equation left, they are a constraint between these states.
+    """
     equations, _ = overdetermined_part(incidence, matching)
     _, unknowns = underdetermined_part(incidence, matching)
-    constraint = [e for e in equations if not incidence[e]]
-    if constraint:
-        raise GustformError(
-            "GF3013",
-            f"{name}: {texts[constraint[0]]} constrains states only (index above 1)",
-            hint="joining the two states by a resistance or a spring, or one state instead of two",
-        )
+    lacking = {labels[z] for z in unknowns}
+    constrained = sorted({s for e in equations for s in states[e] if f"der({s})" in lacking})
+    if constrained:
+        refuse_constraint(name, [texts[e] for e in equations], constrained)
     raise GustformError(
         "GF3012",
         f"{name} is structurally singular: no equation is left for {_list(labels[z] for z in unknowns)}; "
         f"too many for the same variables: {_list(texts[e] for e in equations)}",
         hint="an equation that contains one of the variables named",
+    )
+
+
+def refuse_constraint(name: str, texts: list[str], states: list[str]) -> NoReturn:
+    """GF3013: equations that only tie states to each other, so that no derivative can be chosen freely."""
+    raise GustformError(
+        "GF3013",
+        f"{name}: {_list(texts)} constrain the states {_list(states)} (index above 1)",
+        hint="joining the two states by a resistance or a spring, or one state instead of two",
     )
 
 

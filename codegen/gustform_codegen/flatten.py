@@ -19,7 +19,7 @@ from gustform.language.operators import TableCall, constants, table_calls
 from gustform.language.scope import Elaborated, Symbol, elaborate
 from gustform.language.unitcheck import check_units
 from gustform_codegen.alias import AliasSets, as_alias
-from gustform_codegen.balance import check_balance, refuse_singular
+from gustform_codegen.balance import check_balance, refuse_constraint, refuse_singular
 from gustform_codegen.connections import connection_equations
 from gustform_codegen.events import bend_roots, indicator, refuse_bare_comparisons
 from gustform_codegen.structure import Matching, blocks, match, tear
@@ -183,7 +183,8 @@ class _Flattener:
         if matching.free_equations:
             full = match(with_external, n_own + len(externals), matching)
             if full.free_equations:
-                refuse_singular(self.name, texts, labels, incidence, matching)
+                states = [[symbols[k].path for k in keys_in(s.expression) if k in self.states] for s in statements]
+                refuse_singular(self.name, texts, labels, incidence, matching, states)
             # An equation that fixes a connector potential: the unit's own unknown left over (a flow) is iterated on.
             left_over = [e for e, z in enumerate(full.unknown_of) if z >= n_own]
             iterate = {z for z in range(n_own) if full.equation_of[z] < 0}
@@ -365,6 +366,7 @@ class _Flattener:
         discretes = list(self.e.of_kind("discrete"))
         roots, whens = self._whens(parameters, discretes, order, by_path, solution)
         final_rows = [Row(r.expression, r.text) for r in [*state_rows, *rows]]
+        self.refuse_constraints(final_rows, unknowns, externals, solution)
         calls = self.final_calls(solution)
         roots += bend_roots(
             [(r.expression, r.text) for r in final_rows]
@@ -401,6 +403,17 @@ class _Flattener:
             substituted=sum(self.is_unknown(r.declared) for r in recorded),
             declared_equations=declared_equations,
         )
+
+    def refuse_constraints(
+        self, rows: list[Row], unknowns: list[Unknown], externals: list[tuple[int, Symbol]], solution: Substitution
+    ) -> None:
+        """GF3013 for a row in which nothing is left but states, once everything is put into it."""
+        free = {key_of(u.symbol if u.der is None else u.der) for u in unknowns} | {key for key, _ in externals}
+        for row in rows:
+            used = {*keys_in(row.expression), *self.through_tables(row.expression, solution)}
+            if not used & free:
+                states = [u.path for u in unknowns if u.der is not None and key_of(u.symbol) in used]
+                refuse_constraint(self.name, [row.text], states)
 
     @staticmethod
     def _without(solution: Substitution, paths: set[str]) -> Substitution:

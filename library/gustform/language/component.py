@@ -16,7 +16,7 @@ import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from gustform.language.connector import Connector
 from gustform.language.declare import Declaration, Discrete, Input, Parameter, Part, Table, Variable
@@ -234,7 +234,7 @@ class Component:
             component = component.part(name)
         return component
 
-    def with_value(self, path: str, value: float) -> Component:
+    def with_value(self, path: str, value: float) -> Self:
         """A copy in which the parameter `path` has another value; what is computed from it follows."""
         head, _, rest = path.partition(".")
         modifiers = dict(self._modifiers)
