@@ -70,7 +70,7 @@ static void set_weights(gust_initial *initial, const double *y, const double *yp
 {
     const gust_model *model = initial->system->model;
     const double rtol = initial->options->rtol;
-    const double atol = initial->options->atol > 0.0 ? initial->options->atol : rtol;
+    const double atol = gust_options_absolute(initial->options);
     for (int32_t i = 0; i < model->n_unknowns; ++i) {
         const double size = fabs(model->differential[i] ? yp[i] : y[i]);
         initial->weight[i] = 1.0 / (rtol * size + atol * model->nominal[i]);
@@ -244,7 +244,7 @@ double gust_initial_step(gust_initial *initial, double t, const double *y, doubl
     const gust_model *model = system->model;
     const int32_t n = model->n_unknowns;
     const double rtol = initial->options->rtol;
-    const double atol = initial->options->atol > 0.0 ? initial->options->atol : rtol;
+    const double atol = gust_options_absolute(initial->options);
     /* d/dt of F = 0 at fixed z gives the same matrix times (y'' of differential, y' of algebraic unknowns):
      * M z' = -(F_t + F_y y'), the right-hand side by a difference over so little time that no unknown moves
      * by more than a ten-thousandth of its nominal value. */

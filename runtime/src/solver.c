@@ -235,7 +235,7 @@ static gust_status refused(const gust_solver *solver, char *message, size_t size
 gust_status gust_solver_start(gust_solver *solver, double t, double first_step, char *message, size_t size)
 {
     const gust_model *model = solver->system->model;
-    const double atol = solver->options->atol > 0.0 ? solver->options->atol : solver->options->rtol;
+    const double atol = gust_options_absolute(solver->options);
     for (int32_t i = 0; i < model->n_unknowns; ++i) {
         gust_vector_data(solver->mask)[i] = model->differential[i] ? 1.0 : 0.0;
         gust_vector_data(solver->absolute)[i] = atol * model->nominal[i];
