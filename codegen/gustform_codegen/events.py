@@ -10,6 +10,7 @@ from gustform.language.errors import GustformError, Place
 from gustform_codegen.unit_type import Root
 
 _COMPARISONS = (ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE)
+_DEEP = 100  # levels to which two limiters are compared
 _JUMPS = (ca.OP_SIGN, ca.OP_FLOOR, ca.OP_CEIL, ca.OP_FMOD)
 
 
@@ -64,7 +65,7 @@ def refuse_bare_comparisons(expression: Any, text: str, place: Place | None) -> 
 
 
 def bend_roots(expressions: list[tuple[Any, str]]) -> list[Root]:
-    """One root for each min, max or abs node: the difference of its two branches."""
+    """One root for each min, max or abs: the difference of its two branches. What is written twice counts once."""
     seen: set[int] = set()
     roots: list[Root] = []
     for expression, text in expressions:
@@ -73,7 +74,11 @@ def bend_roots(expressions: list[tuple[Any, str]]) -> list[Root]:
                 continue
             seen.add(node.element_hash())
             if node.is_op(ca.OP_FMIN) or node.is_op(ca.OP_FMAX):
-                roots.append(Root(0, node.dep(0) - node.dep(1), f"limiter in {text}"))
+                root = Root(0, node.dep(0) - node.dep(1), f"limiter in {text}")
             elif node.is_op(ca.OP_FABS):
-                roots.append(Root(0, node.dep(0), f"absolute value in {text}"))
+                root = Root(0, node.dep(0), f"absolute value in {text}")
+            else:
+                continue
+            if not any(ca.is_equal(root.expression, other.expression, _DEEP) for other in roots):
+                roots.append(root)
     return roots
