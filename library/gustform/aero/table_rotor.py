@@ -20,7 +20,9 @@ CP_FLOOR = -0.2
 
 
 class TableRotor(Rotor):
-    """Rotor with Cp(lambda, beta) from a table, e.g. a `Cp_Ct_Cq` file.
+    """Rotor with Cp from a table, e.g. a `Cp_Ct_Cq` file.
+
+        Cp = table(lambda, beta)
 
     The table is evaluated as a twice continuously differentiable bicubic B-spline on a uniform grid; a non-uniform
     grid is resampled (the difference is in `table.resampling_error`). Outside the grid the arguments are held at its

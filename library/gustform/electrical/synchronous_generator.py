@@ -16,8 +16,9 @@ from gustform.language import Component, Input, Output, Parameter, Part, Variabl
 class SynchronousGenerator(Component):
     """Sixth-order machine behind its step-up transformer, with governor and exciter.
 
-          terminal (V, A) -- rotor frame -- transformer (d-q) -- machine -- E_fd -- exciter
-                                                                    |  P_m -- governor
+        terminal (V, A) -- rotor frame -- transformer (d-q) -- machine -- E_fd -- exciter
+                                                                 |
+                                                                P_m -- governor
 
     The transformer is solved in the rotor's frame, together with the stator: no algebraic loop is left. Base of pu:
     `rating` and, at the terminal, `voltage`. P, Q are what all `aggregate` machines deliver. Wire the system's `frame`
