@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from gustform.language.component import Component
+from gustform.language.connector import Connector
 from gustform.language.declare import Input, Parameter, Part
 from gustform.language.errors import GustformError
 from gustform.language.system import Series, System
@@ -116,19 +117,21 @@ class _Assembly:
         self._place_components()
         self._connect_terminals()
         self._connect_listed()
+        if not self.errors:
+            self._find_loose_ends()
         self._wire_frame()
         self._bind_wind()
         self._schedule_events()
         return self.result
 
-    def _fail(self, code: str, path: NodePath, message: str, hint: str = "") -> None:
-        self.errors.append(GustformError(code, message, hint=hint, place=self.document.place(path)))
+    def _fail(self, code: str, path: NodePath, message: str, hint: str = "", *, key: bool = False) -> None:
+        self.errors.append(GustformError(code, message, hint=hint, place=self.document.place(path, key=key)))
 
     def _keep(self, error: GustformError, path: NodePath) -> None:
         place = error.place or self.document.place(path)
         self.errors.append(GustformError(error.code, error.message, hint=error.hint, place=place))
 
-    def _known(self, name: str, path: NodePath) -> bool:
+    def _known(self, name: str, path: NodePath, *, key: bool = False) -> bool:
         if name in self.components:
             return True
         self._fail(
@@ -136,6 +139,7 @@ class _Assembly:
             path,
             f"{dotted(path)} must be the name of a component; there is no {name!r}",
             did_you_mean(name, self.components),
+            key=key,
         )
         return False
 
@@ -198,6 +202,25 @@ class _Assembly:
             known = [self._known(_base(end), ("connections", index, side)) for side, end in enumerate((a, b))]
             if all(known):
                 self._connect(a, b, ("connections", index))
+
+    def _find_loose_ends(self) -> None:
+        """Terminals that nothing is connected to, with the line of their component; the linker would know the name
+        only."""
+        connected = {port for pair in self.result.system.connections for port in pair}
+        for name, entry in self.scenario.components.items():
+            instance = self.result.instances(name)[0]
+            for port, connector in self.components[name].declared(Connector).items():
+                if not connector.optional and f"{instance}.{port}" not in connected:
+                    unit = UNITS[entry.type]
+                    hint = "at: bus" if unit.at == port else "from: and to:" if port in (unit.ends or ()) else ""
+                    if entry.type == "Bus":
+                        hint = f"at: {name} in another component"
+                    self._fail(
+                        "GF3003",
+                        ("components", name),
+                        f"{name}.{port} must be connected ({connector.description}); nothing is",
+                        hint or "an entry under connections",
+                    )
 
     def _connect(self, a: str, b: str, path: NodePath) -> None:
         """Connect two ports; those of several components go one to one, or all to the one at the other end."""
@@ -262,7 +285,7 @@ class _Assembly:
                 )
         for name, block in self.scenario.wind.items():
             path: NodePath = ("wind", name)
-            if not self._known(name, path):
+            if not self._known(name, path, key=True):
                 continue
             wind = self._unit(name).wind
             if wind is None:
@@ -312,11 +335,15 @@ class _Assembly:
             for target, value in event.set.items():
                 path: NodePath = ("events", index, "set", target)
                 name, _, rest = target.partition(".")
-                if not self._known(_base(name), path):
+                if not self._known(_base(name), path, key=True):
                     continue
                 if not rest:
                     self._fail(
-                        "GF2405", path, f"{dotted(path)} must be component.parameter; got {target!r}", f"{target}.P"
+                        "GF2405",
+                        path,
+                        f"{dotted(path[:3])} keys must be component.parameter; got {target!r}",
+                        f"{target}.active",
+                        key=True,
                     )
                     continue
                 number = self.reader.parameter(self.components[_base(name)], rest, value, target, path)

@@ -53,8 +53,10 @@ class Reader:
         kind = unit.kind
         before = len(self.errors)
         given = {key: value for key, value in entry.items() if key not in PLACING_KEYS}
-        if given.get("aggregate") == "turbines":
-            given["aggregate"] = self.many("turbines", (*path, "aggregate"))
+        aggregate = given.pop("aggregate", None)
+        if aggregate == "turbines" or (type(aggregate) is int and aggregate >= 1):
+            given["aggregate"] = self.many(aggregate, (*path, "aggregate"))
+        # Anything else has been refused by the check of the format.
         modifiers = self._modifiers(kind, given, path, bound=frozenset(implied), tables={})
         modifiers.update({key: value for key, value in implied.items() if key not in modifiers})
         if len(self.errors) > before:
@@ -91,6 +93,7 @@ class Reader:
                     path,
                     f"{label} must lead to a parameter; {type(owner).__name__} has no part {part!r}",
                     did_you_mean(part, known),
+                    key=True,
                 )
                 return None
             owner = owner.part(part)
@@ -102,6 +105,7 @@ class Reader:
                 path,
                 f"{label} must lead to a parameter; {type(owner).__name__} has no parameter {last!r}",
                 did_you_mean(last, known_parameters),
+                key=True,
             )
             return None
         if declaration.structural:
@@ -110,6 +114,7 @@ class Reader:
                 path,
                 f"{label} must be a parameter that may change; {last} shapes the equations ({declaration.description})",
                 "setting it in components",
+                key=True,
             )
             return None
         number = self._guarded(partial(_number, declaration, value, label), path)

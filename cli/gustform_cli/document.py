@@ -163,7 +163,8 @@ def parse(text: str, file: str, overrides: Sequence[str] = ()) -> Document:
         )
     overridden: dict[NodePath, str] = {}
     for override in overrides:
-        overridden[_apply(tree, override)] = override
+        for path in _apply(tree, override):
+            overridden[path] = override
     return Document(file, tree, overridden)
 
 
@@ -199,9 +200,12 @@ def _yaml_hint(problem: str) -> str:
     return "checking indentation, colons (key: value) and brackets near this place"
 
 
-def _apply(tree: CommentedMap, override: str) -> NodePath:
-    """Set one path of the tree; returns the path. A first key that is no top-level key but a component's name is
-    looked up among the components, as in events (`load.active`)."""
+def _apply(tree: CommentedMap, override: str) -> list[NodePath]:
+    """Set one path of the tree; returns the path, and those of mappings it had to begin.
+
+    A first key that is no top-level key but a component's name is looked up among the components, as in events
+    (`load.active`).
+    """
     place = Place(f"--set {override}")
     name, equals, text = override.partition("=")
     if not equals or not name.strip():
@@ -215,13 +219,16 @@ def _apply(tree: CommentedMap, override: str) -> NodePath:
         keys.insert(0, "components")
     node: Any = tree
     path: list[str | int] = []
+    begun: list[NodePath] = []
     for depth, step in enumerate(keys):
         last = depth == len(keys) - 1
         if isinstance(node, CommentedMap):
             if not last and step not in node:
-                # A mapping that is not there yet (output, run) may be begun by its first key, not deeper inventions.
-                if depth == 0 and len(keys) == 2:
+                # A mapping that may be left out is begun by its first key: output.every, wt.control.K_gsc. If it may
+                # not be there at all, the check of the whole says so. A new component is more than one value.
+                if (depth == 0 and len(keys) == 2) or (depth >= 2 and keys[0] == "components"):
                     node[step] = CommentedMap()
+                    begun.append((*path, step))
                 else:
                     raise GustformError(
                         "GF2105",
@@ -254,4 +261,4 @@ def _apply(tree: CommentedMap, override: str) -> NodePath:
                 hint=f"--set {dotted(path)}=...",
                 place=place,
             )
-    return tuple(path)
+    return [*begun, tuple(path)]

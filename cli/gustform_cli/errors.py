@@ -42,5 +42,7 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
         return " or ".join(close)
     if not names:
         return ""
+    if len(names) == 1:
+        return names[0]
     shown = names[:12]
     return "one of " + ", ".join(shown) + (", ..." if len(names) > len(shown) else "")

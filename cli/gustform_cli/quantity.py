@@ -86,7 +86,10 @@ def parse_quantity(value: object, declared: str, path: str, description: str = "
     example = _example(declared)
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         raise GustformError(
-            "GF2001", f"{path} must be a quantity in {declared}{what}; got {_shown(value)}", hint=example
+            "GF2001",
+            f"{path} must be {'a number' if is_plain(declared) else f'a quantity in {declared}'}{what}; "
+            f"got {_shown(value)}",
+            hint=example,
         )
     if isinstance(value, str):
         match = _QUANTITY.fullmatch(value)

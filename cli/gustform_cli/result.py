@@ -14,6 +14,7 @@ import json
 import os
 import re
 import tempfile
+import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,7 +31,8 @@ if TYPE_CHECKING:
 RESULT = "result.nc"
 PARTIAL = "result.nc.part"
 
-_CHUNK_BYTES = 16_384
+_COMPRESSED_FROM = 16 << 20  # bytes; below, the time is worth more than the space
+
 _INSTANCE = re.compile(r"(?P<component>[^.\[]+)\[(?P<number>\d+)\](?P<rest>\..*)")
 
 
@@ -101,6 +103,7 @@ class ResultWriter:
         quantities: Sequence[Quantity],
         counts: Mapping[str, int],
         most_rows: int,
+        block_rows: int,
         attributes: Mapping[str, str],
     ) -> None:
         import h5py  # 0.2 s: not for `gustform --help`
@@ -109,10 +112,12 @@ class ResultWriter:
         self.rows = 0
         self._final = folder / RESULT
         self._variables = arrange(quantities, counts)
+        # A block is a chunk: it is written once, and HDF5 has nothing to keep that would grow with the run.
+        self._chunk_rows = min(block_rows, most_rows)
+        self._compressed = 4 * most_rows * len(quantities) > _COMPRESSED_FROM
         widest = max((v.columns.size for v in self._variables), default=1)
         try:
-            # One chunk per variable in HDF5's cache: more would fill up with the length of the run.
-            self._file = h5py.File(self.path, "w", track_order=True, rdcc_nbytes=2 * max(_CHUNK_BYTES, 256 * widest))
+            self._file = h5py.File(self.path, "w", track_order=True, rdcc_nbytes=8 * self._chunk_rows * widest)
             self._create(attributes, most_rows)
         except OSError as error:
             raise _not_written(self.path, error) from None
@@ -130,17 +135,16 @@ class ResultWriter:
             if dimension is not None and dimension not in numbers:
                 numbers[dimension] = self._scale(dimension, np.arange(1, size + 1, dtype=np.int32), size)
                 numbers[dimension].attrs["long_name"] = f"number of the {dimension}"
-            rows = min(most_rows, int(np.clip(_CHUNK_BYTES // (4 * size), 64, 4096)))
             tail = () if dimension is None else (size,)
             dataset = self._file.create_dataset(
                 variable.quantity.name,
                 (0, *tail),
                 np.float32,
                 maxshape=(most_rows, *tail),
-                chunks=(rows, *tail),
-                compression="gzip",
-                compression_opts=1,
-                shuffle=True,
+                chunks=(self._chunk_rows, *tail),
+                compression="gzip" if self._compressed else None,
+                compression_opts=1 if self._compressed else None,
+                shuffle=self._compressed,
             )
             dataset.attrs["units"] = variable.quantity.unit
             dataset.attrs["long_name"] = variable.quantity.description
@@ -153,7 +157,7 @@ class ResultWriter:
     def _scale(self, name: str, values: NDArray[Any], most: int) -> h5py.Dataset:
         """A dimension with its coordinate variable."""
         scale = self._file.create_dataset(
-            name, values.shape, values.dtype, data=values, maxshape=(most,), chunks=(min(most, 4096),)
+            name, values.shape, values.dtype, data=values, maxshape=(most,), chunks=(min(most, self._chunk_rows),)
         )
         scale.make_scale(name)
         return scale
@@ -165,13 +169,27 @@ class ResultWriter:
             self._time.resize((end,))
             self._time[self.rows : end] = times
             for variable, dataset in zip(self._variables, self._datasets, strict=True):
-                block = rows[:, variable.columns] if variable.dimension else rows[:, variable.columns[0]]
-                dataset.resize((end, *dataset.shape[1:]))
-                dataset[self.rows : end] = block
+                self._write(dataset, rows[:, variable.columns] if variable.dimension else rows[:, variable.columns[0]])
             self._file.flush()
         except OSError as error:
             raise _not_written(self.path, error) from None
         self.rows = end
+
+    def _write(self, dataset: h5py.Dataset, block: NDArray[np.float32]) -> None:
+        """Add a block to one variable. Whole chunks go past HDF5's selection machinery and its filters, which would
+        take ten times as long as the writing itself."""
+        end = self.rows + block.shape[0]
+        dataset.id.set_extent((end, *dataset.shape[1:]))
+        if self.rows % self._chunk_rows or block.shape[0] > self._chunk_rows:
+            dataset[self.rows : end] = block
+            return
+        chunk = np.zeros(dataset.chunks, np.float32)  # the last one is shorter; what lies beyond the end is not read
+        chunk[: block.shape[0]] = block
+        data = chunk.tobytes()
+        if self._compressed:  # as HDF5's shuffle and gzip do it: first bytes of all values, second bytes, ...
+            shuffled = np.frombuffer(data, np.uint8).reshape(-1, 4).T
+            data = zlib.compress(shuffled.tobytes(), 1)
+        dataset.id.write_direct_chunk((self.rows, *[0] * (chunk.ndim - 1)), data)
 
     def finish(self, status: str, statistics: Mapping[str, Any]) -> Path:
         """Write how the run ended, close the file and give it its name. Returns the path it has then."""

@@ -50,6 +50,12 @@ def _check_name(value: object) -> object:
     return value
 
 
+def _check_many(value: object) -> object:
+    if value == "turbines" or (isinstance(value, int) and not isinstance(value, bool) and value >= 1):
+        return value
+    raise _refuse("GF2003", f" must be a whole number from 1 on, or the word turbines; got {_shown(value)}", "1")
+
+
 def _quantity(
     unit: str, *, above: float = -math.inf, low: float = -math.inf, high: float = math.inf
 ) -> Callable[[object], float]:
@@ -84,8 +90,12 @@ Duration = Annotated[float, BeforeValidator(_quantity("s", above=0.0)), WithJson
 Speed = Annotated[float, BeforeValidator(_quantity("m/s", low=0.5, high=100.0)), WithJsonSchema(_in("m/s", "8 m/s"))]
 Length = Annotated[float, BeforeValidator(_quantity("m", above=0.0)), WithJsonSchema(_in("m", "90 m"))]
 Tolerance = Annotated[float, BeforeValidator(_quantity("1", low=1e-12, high=1e-2)), WithJsonSchema(_in("1", "1e-6"))]
-# A number of turbines, or the word that stands for the scenario's own.
-Many = Annotated[StrictInt, Field(ge=1)] | Literal["turbines"]
+# A number of things, or the word that stands for the scenario's number of turbines.
+Many = Annotated[
+    int | Literal["turbines"],
+    BeforeValidator(_check_many),
+    WithJsonSchema({"anyOf": [{"type": "integer", "minimum": 1}, {"const": "turbines"}]}),
+]
 
 
 def _check_fidelity(value: object) -> object:
@@ -286,7 +296,7 @@ def _translate(document: Document, plain: Mapping[str, Any], details: ErrorDetai
         key = loc[-1:] == ("[key]",)
         return GustformError(
             kind,
-            f"{dotted(path[:-1] if key else path)}{' keys' if key else ''}{context['message']}",
+            f"{f'the key {name}' if key else name}{context['message']}",
             hint=context["hint"],
             place=document.place(path, key=key),
         )
@@ -327,5 +337,16 @@ def _translate(document: Document, plain: Mapping[str, Any], details: ErrorDetai
         return GustformError(
             "GF2203", f"{name} must be {_SHAPES[kind]}; got {got}", hint=f"writing {_SHAPES[kind]}", place=place
         )
-    bound = details["msg"].replace("Input should be ", "").replace("should have", "have")
-    return GustformError("GF2003", f"{name} must be {bound}; got {got}", hint="a value that is", place=place)
+    if kind in ("too_short", "too_long"):
+        wanted = context.get("min_length", context.get("max_length"))
+        least = "at least" if kind == "too_short" else "at most"
+        return GustformError(
+            "GF2003",
+            f"{name} must have {least} {wanted} entries; it has {context['actual_length']}",
+            hint=f"{least} {wanted}",
+            place=place,
+        )
+    if kind == "string_too_short":
+        return GustformError("GF2003", f"{name} must not be empty; got {got}", hint="a word", place=place)
+    bound = details["msg"].replace("Input should be ", "")
+    return GustformError("GF2003", f"{name} must be {bound}; got {got}", hint=f"a value {bound}", place=place)

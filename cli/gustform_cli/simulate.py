@@ -31,7 +31,9 @@ from gustform_codegen.table import SystemTable
 if TYPE_CHECKING:
     from gustform_runtime import Simulation
 
-_BLOCK_BYTES = 4 << 20  # of one block of rows: large enough for HDF5, small enough for a thousand turbines
+_BLOCK_BYTES = 1 << 20  # of one block of rows, at most: some 20 rows of a thousand turbines
+_BLOCKS = 20  # of a run, at least: what a killed run may lose
+_BLOCK_ROWS = (1024, 4096)  # fewer cost time, more cost memory
 _POLL = 0.1  # s between looks at the time reached
 
 
@@ -75,7 +77,9 @@ class _Run:
         scenario = assembled.scenario
         self.assembled, self.model, self.table, self.interrupt = assembled, model, table, interrupt
         self.until, self.every = scenario.run.until, scenario.output.every
-        self.block_rows = int(np.clip(_BLOCK_BYTES // (4 * max(1, len(model.channels))), 16, 1024))
+        rows = math.floor(self.until / self.every * (1.0 + 1e-9)) + 2
+        fitting = max(16, _BLOCK_BYTES // (4 * max(1, len(model.channels))))
+        self.block_rows = min(fitting, int(np.clip(rows // _BLOCKS, *_BLOCK_ROWS)))
         event = min((event.at for event in scenario.events), default=None)
         self.watch = FrequencyWatch(event, self.until) if assembled.frequency in _names(model) else None
         self.watched = _names(model).index(assembled.frequency) if self.watch is not None else -1
@@ -83,7 +87,8 @@ class _Run:
             out,
             [Quantity(channel.name, channel.unit, channel.description) for channel in model.channels],
             assembled.counts,
-            most_rows=math.floor(self.until / self.every * (1.0 + 1e-9)) + 2,
+            most_rows=rows,
+            block_rows=self.block_rows,
             attributes=self._attributes(),
         )
         self.failure: BaseException | None = None

@@ -12,6 +12,7 @@ What lies above the Nyquist frequency is left out (0.3 % of the standard deviati
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,26 @@ from gustform_cli.wind.rotor import rotor_effective
 _SEGMENT_SECONDS = 600.0
 # The rotor equations know no standstill wind; Gaussian turbulence on a low mean would get there.
 LOWEST_SPEED = 0.5
+
+
+@lru_cache(maxsize=8)  # the turbines of a farm have the same
+def _amplitudes(spectrum: Kaimal, size: int, step: float, radius: float | None) -> NDArray[np.complex128]:
+    """For each frequency of a segment the rms of its harmonic, m/s, with the phase that the rotor's filter adds."""
+    frequency = np.fft.rfftfreq(size, step).astype(np.float64)
+    half_bin = 0.5 * frequency[1]
+    upper = spectrum.variance_below(np.minimum(frequency + half_bin, frequency[-1]))
+    lower = spectrum.variance_below(np.maximum(frequency - half_bin, 0.0))
+    amplitude: NDArray[np.complex128] = np.sqrt(upper - lower).astype(np.complex128)
+    if radius is not None:
+        amplitude *= rotor_effective(frequency, radius, spectrum.mean)
+    return amplitude
+
+
+@lru_cache(maxsize=8)
+def _windows(size: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The rising and the falling window over half a segment."""
+    angle = 0.5 * np.pi * (np.arange(size) + 0.5) / size
+    return np.sin(angle), np.cos(angle)
 
 
 class TurbulentWind:
@@ -38,15 +59,8 @@ class TurbulentWind:
         self._seed = seed
         self._size = 1 << max(10, math.ceil(math.log2(_SEGMENT_SECONDS / step)))
         self.block_size = self._size // 2
-        frequency = np.fft.rfftfreq(self._size, step).astype(np.float64)
-        half_bin = 0.5 * frequency[1]
-        upper = spectrum.variance_below(np.minimum(frequency + half_bin, frequency[-1]))
-        lower = spectrum.variance_below(np.maximum(frequency - half_bin, 0.0))
-        self._amplitude: NDArray[np.complex128] = np.sqrt(upper - lower).astype(np.complex128)
-        if radius is not None:
-            self._amplitude *= rotor_effective(frequency, radius, spectrum.mean)
-        angle = 0.5 * np.pi * (np.arange(self.block_size) + 0.5) / self.block_size
-        self._rise, self._fall = np.sin(angle), np.cos(angle)
+        self._amplitude = _amplitudes(spectrum, self._size, step, radius)
+        self._rise, self._fall = _windows(self.block_size)
         self._kept: tuple[int, NDArray[np.float64], NDArray[np.float64]] | None = None
 
     def _segment(self, number: int) -> NDArray[np.float64]:

@@ -29,7 +29,7 @@ def rows(first: int, count: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_opens_in_xarray(tmp_path: Path) -> None:
-    writer = ResultWriter(tmp_path, QUANTITIES, {"wt": 3}, 10_000, {"title": "case", "scenario": "x" * 200_000})
+    writer = ResultWriter(tmp_path, QUANTITIES, {"wt": 3}, 10_000, 1000, {"title": "case", "scenario": "x" * 200_000})
     for first in range(0, 5000, 1000):
         writer.append(*rows(first, 1000))
     assert (tmp_path / PARTIAL).exists()
@@ -55,7 +55,7 @@ sys.path.insert(0, {str(Path(__file__).parent)!r})
 from test_result import QUANTITIES, rows
 from gustform_cli.result import ResultWriter
 from pathlib import Path
-writer = ResultWriter(Path({str(tmp_path)!r}), QUANTITIES, {{"wt": 3}}, 1_000_000, {{}})
+writer = ResultWriter(Path({str(tmp_path)!r}), QUANTITIES, {{"wt": 3}}, 1_000_000, 1000, {{}})
 for first in range(0, 1_000_000, 1000):
     writer.append(*rows(first, 1000))
     print(first + 1000, flush=True)
@@ -94,5 +94,5 @@ def test_a_folder_that_is_not_writable(tmp_path: Path, kind: str) -> None:
 def test_a_full_disk_is_an_error_of_ours(tmp_path: Path) -> None:
     (tmp_path / PARTIAL).symlink_to("/dev/full")
     with pytest.raises(GustformError) as caught:
-        ResultWriter(tmp_path, QUANTITIES, {"wt": 3}, 1000, {})
+        ResultWriter(tmp_path, QUANTITIES, {"wt": 3}, 1000, 1000, {})
     assert caught.value.code == "GF7001"
