@@ -84,9 +84,9 @@ class SynchronousGenerator(Component):
 
     def rest(self) -> MachineRest:
         """The machine at rest at the first guess of P and Q, with 1 pu and angle 0 at the terminal of the plant."""
-        power = complex(self.P_start, self.Q_start)
-        voltage = 1.0 + complex(self.transformer.r, self.transformer.x) * power.conjugate()
-        rest: MachineRest = self.machine.rest(power, voltage)
+        current = complex(self.P_start, -self.Q_start)
+        voltage = 1.0 + complex(self.transformer.r, self.transformer.x) * current
+        rest: MachineRest = self.machine.rest(voltage * current.conjugate(), voltage)
         return rest
 
     def equations(self) -> None:
