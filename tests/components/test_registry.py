@@ -51,11 +51,11 @@ def test_parts_are_found_by_name_and_alias() -> None:
 
 def test_what_does_not_exist_or_fit_is_refused_with_a_suggestion() -> None:
     rotor = place(PmsgTurbine, "rotor")
-    with pytest.raises(GustformError, match="GF2012.*no unit of type 'PmsgTurbin'.*try PmsgTurbine"):
+    with pytest.raises(GustformError, match=r"GF2012.*no unit of type 'PmsgTurbin'.*try PmsgTurbine"):
         find_unit("PmsgTurbin")
     with pytest.raises(GustformError, match=r"GF2012.*no Rotor of type 'os.system'"):
         find_part("os.system", rotor)
-    with pytest.raises(GustformError, match="GF1007.*rotor must be a Rotor"):
+    with pytest.raises(GustformError, match=r"GF1007.*rotor must be a Rotor"):
         find_part("TGOV1", rotor)
     with pytest.raises(GustformError, match="GF2012"):
         find_part("PmsgTurbine", rotor)

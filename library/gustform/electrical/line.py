@@ -12,7 +12,8 @@ class Line(Component):
         v_sending - v_receiving = (R + jX) i        i from the sending to the receiving end
         i_sending + i_receiving = 0
 
-    SI units: R, X in ohm per phase. With line-to-line voltages and currents scaled by sqrt(3) the equation keeps this form.
+    SI units: R, X in ohm per phase. With line-to-line voltages and currents scaled by sqrt(3) the equation keeps
+    this form.
     Source: Kundur, Power System Stability and Control, 1994, 6.1 (short line).
     """
 
