@@ -263,6 +263,7 @@ def steady_state(linked: Linked, max_iterations: int = 300) -> SteadyState:
         {"x": x, "f": ca.MX(0), "g": residual(x, ca.MX(0, 1))},
         {
             "print_time": False,
+            "show_eval_warnings": False,
             "jac_g": jacobian,
             # The objective is zero and so are the multipliers at a solution: the iteration is Newton's.
             "hess_lag": no_curvature,

@@ -145,9 +145,12 @@ def _channel(t: LinkedType, k: int, path: str, name: str, sign: int) -> tuple[Ch
 
 @dataclass(frozen=True, eq=False)
 class _ConnectionSet:
-    ports: list[str]
+    ports: list[str]  # the one with the most connections first
     connector: Connector
-    hub: str
+
+    @property
+    def hub(self) -> str:
+        return self.ports[0]
 
 
 def connection_sets(system: System) -> list[_ConnectionSet]:
@@ -178,7 +181,7 @@ def connection_sets(system: System) -> list[_ConnectionSet]:
             # An optional port that nobody uses is a set of its own: its flows sum to zero.
             groups.setdefault(find(path), []).append(path)
     return [
-        _ConnectionSet(ports, system.port(ports[0]), max(ports, key=lambda p: degree.get(p, 0)))
+        _ConnectionSet(sorted(ports, key=lambda p: -degree.get(p, 0)), system.port(ports[0]))
         for ports in groups.values()
     ]
 
@@ -204,13 +207,10 @@ def link(system: System, types: list[tuple[UnitType, Kernel, str, list[str]]]) -
         for name in group.connector._potentials:
             for port in group.ports:
                 shared[f"{port}.{name}"] = n + len(shared_names)
-            instance, _, port_name = group.hub.partition(".")
-            component = system.components[instance]
-            connector = component.declared(Connector)[port_name]
-            potential = group.connector._potentials[name]
-            path = f"{port_name}.{name}"
-            start.append(component.number(connector.start.get(name, potential.start), f"{path} (start)"))
-            nominal.append(_nominal(component, connector.nominal.get(name, potential.nominal), path))
+            component, path, value = _declared_by(system, group, name, "start")
+            start.append(component.number(value, f"{path} (start)"))
+            component, path, value = _declared_by(system, group, name, "nominal")
+            nominal.append(_nominal(component, value, path))
             shared_names.append(f"{group.hub}.{name}")
     total = n + len(shared_names)
 
@@ -307,6 +307,18 @@ def link(system: System, types: list[tuple[UnitType, Kernel, str, list[str]]]) -
     answer = Linked(system, linked, result, shared, shared_names, operating, numbers)
     check_structure(answer)
     return answer
+
+
+def _declared_by(system: System, group: _ConnectionSet, name: str, what: str) -> tuple[Component, str, Any]:
+    """The start or nominal of a shared potential, from the first port of the set that declares one of its own."""
+    for port in group.ports:
+        declared = getattr(system.port(port), what)
+        if name in declared:
+            break
+    else:
+        port, declared = group.hub, {name: getattr(group.connector._potentials[name], what)}
+    instance, _, port_name = port.partition(".")
+    return system.components[instance], f"{port_name}.{name}", declared[name]
 
 
 def _nominal(owner: Component, declared: Any, label: str) -> float:
