@@ -176,6 +176,39 @@ static bool look_again(gust_events *events, gust_system *system, double t, const
     return true;
 }
 
+bool gust_events_settle(gust_events *events, gust_system *system, double t, const double *y, const double *yp)
+{
+    bool any = false;
+    events->unsettled = false;
+    if (!look_again(events, system, t, y, yp, &any)) {
+        return false;
+    }
+    for (int64_t k = 0; k < events->n_conditional; ++k) {
+        events->unsettled = events->unsettled || events->value[events->conditional[k].watched] == 0.0;
+    }
+    return true;
+}
+
+bool gust_events_missed(gust_events *events, gust_system *system, double t, const double *y, const double *yp,
+                        bool *any)
+{
+    events->unsettled = false;
+    if (!look_again(events, system, t, y, yp, any)) {
+        return false;
+    }
+    for (int64_t k = 0; k < events->n_watched; ++k) {
+        events->found[k] = 0;
+    }
+    for (int64_t k = 0; k < events->n_conditional; ++k) {
+        const gust_conditional *clause = &events->conditional[k];
+        events->unsettled = events->unsettled || events->value[clause->watched] == 0.0;
+        if (clause->fires) {
+            events->found[clause->watched] = 1;
+        }
+    }
+    return true;
+}
+
 /* Conditions as they are before the event; those the integrator found are the ones that fire. */
 static bool look_before(gust_events *events, gust_system *system, double t, bool found, const double *y,
                         const double *yp, bool *any)
@@ -261,11 +294,9 @@ gust_status gust_events_handle(gust_events *events, gust_system *system, gust_sa
     }
     bool conditions = false;
     bool samples = false;
-    /* A limiter crossing changes no value but is worth a restart: the right side is smooth only beyond it. */
-    *changed = false;
-    for (int64_t k = 0; found && k < events->n_watched; ++k) {
-        *changed = *changed || (events->found[k] != 0 && !events->watched[k].is_when);
-    }
+    /* A zero crossing is worth a restart even if no value changes: right of a limiter's the equations are
+     * smooth again, and the integrator does not like to go on from a function that stays at 0. */
+    *changed = found;
     if (!look_before(events, system, t, found, y, yp, &conditions)) {
         return series_failure(system, message, size);
     }

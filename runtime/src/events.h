@@ -44,6 +44,7 @@ typedef struct gust_events {
     int *found;      /* [n_watched] from the integrator */
     double *y_after;
     double *discrete_after;
+    bool unsettled; /* a condition is exactly 0 where the integrator starts: it would not see it become true */
     int64_t n_events;
     double last_event; /* time of the last root found, s */
     int64_t in_succession;
@@ -56,6 +57,14 @@ void gust_events_free(gust_events *events);
 /* All watched root functions into value[n_watched]. false if a time series failed. */
 bool gust_events_roots(gust_events *events, gust_system *system, double t, const double *y, const double *yp,
                        double *value);
+
+/* Takes the conditions as they are at t, where the integrator starts. false if a time series failed. */
+bool gust_events_settle(gust_events *events, gust_system *system, double t, const double *y, const double *yp);
+
+/* After the first step from an unsettled start: whether a condition has become true in it, marked in
+ * events->found. false if a time series failed. */
+bool gust_events_missed(gust_events *events, gust_system *system, double t, const double *y, const double *yp,
+                        bool *any);
 
 /* Everything that happens at t. `found`: the integrator stopped at roots, marked in events->found.
  * y, yp are the values before on entry and consistent values after on return, if *changed. */

@@ -52,6 +52,18 @@ static double first_step(gust_sim *sim, double t, double until)
     return fmax(step, 1e3 * DBL_EPSILON * fmax(fabs(t), 1e-3));
 }
 
+/* Start of the integrator where a condition is exactly 0: a very small step shows which way it goes. */
+static double settling_step(double t)
+{
+    return 1e-12 * fmax(1.0, fabs(t));
+}
+
+static gust_status series_failure(gust_sim *sim)
+{
+    gust_text(sim->message, sizeof sim->message, "%s", sim->system.series.message);
+    return sim->system.series.failure;
+}
+
 static gust_status handle_event(gust_sim *sim, double until)
 {
     gust_solver *solver = &sim->solver;
@@ -67,8 +79,14 @@ static gust_status handle_event(gust_sim *sim, double until)
     if (status != GUST_OK || !changed) {
         return status;
     }
-    return gust_solver_restart(solver, solver->t, first_step(sim, solver->t, until), sim->message,
-                               sizeof sim->message);
+    if (!gust_events_settle(&sim->events, &sim->system, solver->t, gust_vector_data(solver->y),
+                            gust_vector_data(solver->yp))) {
+        return series_failure(sim);
+    }
+    const double step = first_step(sim, solver->t, until);
+    return gust_solver_restart(solver, solver->t,
+                               sim->events.unsettled ? fmin(step, settling_step(solver->t)) : step,
+                               sim->message, sizeof sim->message);
 }
 
 static gust_status end_of_data(gust_sim *sim)
@@ -134,6 +152,15 @@ gust_status gust_integrate(gust_sim *sim, double until)
             break;
         case GUST_STEP_FAILED:
             return status;
+        }
+        if (sim->events.unsettled && !sim->root_found) {
+            bool missed = false;
+            if (!gust_events_missed(&sim->events, &sim->system, solver->t, gust_vector_data(solver->y),
+                                    gust_vector_data(solver->yp), &missed)) {
+                return series_failure(sim);
+            }
+            sim->pending = sim->pending || missed;
+            sim->root_found = missed;
         }
     }
 }

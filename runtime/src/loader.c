@@ -9,6 +9,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include "container.h"
 #include "gustform/gust_model.h"
@@ -376,6 +377,21 @@ static bool check_samples(loader *load, const gust_model_series *series)
     return true;
 }
 
+/* The samples of a series that is held in the model. */
+static bool read_samples(loader *load, gust_model_series *series)
+{
+    const void *value = NULL;
+    if (!sized(load, "value", GUST_F64, &value, &series->n_samples)) {
+        return false;
+    }
+    series->value = value;
+    if (series->n_samples < 1) {
+        return refuse(load, GUST_BAD_SERIES, "series \"%s\" is empty", series->name);
+    }
+    return (series->uniform || doubles(load, "time", series->n_samples, &series->time)) &&
+           check_samples(load, series);
+}
+
 static bool read_series(loader *load, int32_t number)
 {
     gust_model *model = load->model;
@@ -411,6 +427,13 @@ static bool read_series(loader *load, int32_t number)
                       "series \"%s\" has a sample step of %g s: it must be greater than 0", series->name,
                       series->dt);
     }
+    if (series->source == GUST_SERIES_INLINE && !read_samples(load, series)) {
+        return false;
+    }
+    if (series->on_end == GUST_SERIES_END_REPEAT && !isfinite(series->t_end) && series->n_samples > 0) {
+        series->t_end = series->uniform ? series->t0 + (double)(series->n_samples - 1) * series->dt
+                                        : series->time[series->n_samples - 1];
+    }
     if (series->on_end == GUST_SERIES_END_REPEAT && !(isfinite(series->t_end) && series->t_end > series->t0)) {
         return refuse(load, GUST_BAD_SERIES, "series \"%s\" is to be repeated but has no length (%g s to %g s)",
                       series->name, series->t0, series->t_end);
@@ -429,20 +452,6 @@ static bool read_series(loader *load, int32_t number)
             memcpy(&model->paths[number], &completed, sizeof completed);
             series->path = completed;
         }
-    }
-    if (series->source == GUST_SERIES_INLINE) {
-        const void *value = NULL;
-        if (!sized(load, "value", GUST_F64, &value, &series->n_samples)) {
-            return false;
-        }
-        series->value = value;
-        if (series->n_samples < 1) {
-            return refuse(load, GUST_BAD_SERIES, "series \"%s\" is empty", series->name);
-        }
-        if (!series->uniform && !doubles(load, "time", series->n_samples, &series->time)) {
-            return false;
-        }
-        return check_samples(load, series);
     }
     return true;
 }
@@ -797,19 +806,16 @@ static gust_status read_file(const char *path, uint8_t **data, size_t *n_bytes, 
         gust_text(message, size, "model file \"%s\" cannot be opened: %s", path, strerror(errno));
         return GUST_FILE_UNREADABLE;
     }
-    long length = -1;
-    if (fseek(file, 0, SEEK_END) == 0) {
-        length = ftell(file);
-    }
-    if (length < 0 || fseek(file, 0, SEEK_SET) != 0) {
-        gust_text(message, size, "model file \"%s\" cannot be read: %s", path, strerror(errno));
+    struct stat facts;
+    if (fstat(fileno(file), &facts) != 0 || !S_ISREG(facts.st_mode)) {
+        gust_text(message, size, "model file \"%s\" is not an ordinary file", path);
         fclose(file);
         return GUST_FILE_UNREADABLE;
     }
-    *n_bytes = (size_t)length;
+    *n_bytes = (size_t)facts.st_size;
     *data = gust_allocate(*n_bytes, 1);
     if (*data == NULL) {
-        gust_text(message, size, "out of memory for model file \"%s\" of %ld bytes", path, length);
+        gust_text(message, size, "out of memory for model file \"%s\" of %zu bytes", path, *n_bytes);
         fclose(file);
         return GUST_OUT_OF_MEMORY;
     }

@@ -15,8 +15,7 @@
     X(kinks, 0.0, 0.0, 1.0, "1: locate every limiter crossing and restart there; 0: pass over them")           \
     X(nonlinear_coefficient, 0.33, 1e-6, 10.0, "how exactly a step is solved, in tolerances")                  \
     X(nonlinear_iterations, 4.0, 1.0, 100.0, "Newton iterations in a step before it is made smaller")          \
-    X(cj_change, 0.1, 0.0, 0.95,                                                                               \
-      "relative change of the step's leading coefficient that renews the Jacobian")                            \
+    X(cj_change, 0.1, 0.0, 0.95, "relative change of the step's leading coefficient that renews the Jacobian") \
     X(growth_check, 20.0, 0.0, 1e9, "refactorisations between two checks of the pivot growth; 0: never check") \
     X(growth_limit, 1e-8, 0.0, 1.0, "reciprocal pivot growth under which pivots are chosen anew")              \
     X(initial_iterations, 50.0, 1.0, 10000.0, "Newton iterations for consistent values")                       \

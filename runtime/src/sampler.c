@@ -52,8 +52,9 @@ static double period_of(const gust_sampled *sampled)
     return sampled->block->parameters[(int64_t)sampled->instance * n_parameters + sampled->parameter];
 }
 
-/* Periods may have changed: a clause then counts from its last sample. */
-static bool renew_periods(gust_sampler *sampler, const gust_sampled **bad)
+/* Periods may have changed: a clause then counts from its last sample, and if the next one should have been
+ * before t it is now. */
+static bool renew_periods(gust_sampler *sampler, double t, const gust_sampled **bad)
 {
     for (int32_t k = 0; k < sampler->n_sampled; ++k) {
         gust_sampled *sampled = &sampler->sampled[k];
@@ -62,14 +63,15 @@ static bool renew_periods(gust_sampler *sampler, const gust_sampled **bad)
             *bad = sampled;
             return false;
         }
-        if (period != sampled->period) {
-            if (sampled->count > 0) {
-                sampled->start += (double)(sampled->count - 1) * sampled->period;
-                sampled->count = 1;
-            }
-            sampled->period = period;
-            sampled->next = sampled->start + (double)sampled->count * period;
+        if (period == sampled->period) {
+            continue;
         }
+        const double last = sampled->start + (double)(sampled->count - 1) * sampled->period;
+        sampled->start = sampled->count > 0 ? last + period : sampled->start;
+        sampled->start = sampled->start < t ? t : sampled->start;
+        sampled->count = 0;
+        sampled->period = period;
+        sampled->next = sampled->start;
     }
     return true;
 }
@@ -81,7 +83,7 @@ bool gust_sampler_start(gust_sampler *sampler, gust_system *system, double t0, c
         sampler->sampled[k].start = t0;
         sampler->sampled[k].count = 0;
     }
-    return gust_sampler_change(sampler, system, t0, &changed, bad) && renew_periods(sampler, bad);
+    return gust_sampler_change(sampler, system, t0, &changed, bad) && renew_periods(sampler, t0, bad);
 }
 
 double gust_sampler_next(const gust_sampler *sampler)
@@ -126,5 +128,5 @@ bool gust_sampler_change(gust_sampler *sampler, gust_system *system, double t, b
                                     entry->value);
     }
     *changed = *changed || any;
-    return !any || renew_periods(sampler, bad);
+    return !any || renew_periods(sampler, t, bad);
 }

@@ -208,10 +208,15 @@ static gust_status prepare(gust_sim *sim, double t0)
     if (status != GUST_OK) {
         return status;
     }
+    if (!gust_events_settle(&sim->events, &sim->system, t0, y, yp)) {
+        gust_text(message, size, "%s", sim->system.series.message);
+        return sim->system.series.failure;
+    }
     /* 1 ms bounds the very first step; the integrator doubles it as long as the error allows. */
-    const double longest = sim->options.first_step > 0.0 ? sim->options.first_step : 1e-3;
-    const double step = gust_initial_step(&sim->initial, t0, y, yp, longest);
-    return gust_solver_start(&sim->solver, t0, sim->options.first_step > 0.0 ? longest : step, message, size);
+    double step = gust_initial_step(&sim->initial, t0, y, yp, 1e-3);
+    step = sim->options.first_step > 0.0 ? sim->options.first_step : step;
+    step = sim->events.unsettled ? fmin(step, 1e-12 * fmax(1.0, fabs(t0))) : step;
+    return gust_solver_start(&sim->solver, t0, step, message, size);
 }
 
 gust_status gust_sim_initialise(gust_sim *sim, double t0)

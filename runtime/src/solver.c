@@ -254,7 +254,7 @@ gust_status gust_solver_start(gust_solver *solver, double t, double first_step, 
     }
     solver->t = t;
     solver->stop = INFINITY;
-    solver->first = true;
+    solver->stalled_steps = 0;
     return GUST_OK;
 }
 
@@ -290,9 +290,11 @@ gust_status gust_solver_restart(gust_solver *solver, double t, double first_step
     }
     solver->t = t;
     solver->stop = INFINITY;
-    solver->first = true;
+    solver->stalled_steps = 0;
     return GUST_OK;
 }
+
+enum { MAX_STALLED_STEPS = 100 };
 
 /* -- steps ---------------------------------------------------------------------------------------------- */
 
@@ -381,6 +383,17 @@ static gust_status explain(gust_solver *solver, int flag, char *message, size_t 
     }
 }
 
+/* Whether the time has stopped moving: next to a pole the integrator goes on for ever with steps that are
+ * lost in rounding. */
+static bool stalled(gust_solver *solver, double before)
+{
+    if (solver->t - before > 4.0 * DBL_EPSILON * fabs(solver->t)) {
+        solver->stalled_steps = 0;
+        return false;
+    }
+    return ++solver->stalled_steps > MAX_STALLED_STEPS;
+}
+
 gust_step gust_solver_step(gust_solver *solver, double stop, gust_status *status, char *message, size_t size)
 {
     if (stop != solver->stop) {
@@ -389,8 +402,12 @@ gust_step gust_solver_step(gust_solver *solver, double stop, gust_status *status
     }
     /* In this mode the output time only says which way to go. */
     const double direction = solver->t + fmax(1.0, fabs(solver->t));
+    const double before = solver->t;
     const int flag = IDASolve(solver->ida, direction, &solver->t, solver->y, solver->yp, IDA_ONE_STEP);
-    solver->first = false;
+    if (flag >= 0 && stalled(solver, before)) {
+        *status = explain_error_test(solver, message, size);
+        return GUST_STEP_FAILED;
+    }
     switch (flag) {
     case IDA_SUCCESS:
         return GUST_STEP_TAKEN;

@@ -31,9 +31,9 @@ typedef struct gust_solver {
     klu_common common;
     klu_symbolic *symbolic;
     gust_factors factors;
-    double t;    /* of y and yp, s */
-    double stop; /* time the integrator may not step over, s */
-    bool first;  /* no step since the last restart */
+    double t;          /* of y and yp, s */
+    double stop;       /* time the integrator may not step over, s */
+    int stalled_steps; /* in succession, that did not move the time */
     /* the last point at which the residual was evaluated, for diagnosis */
     double last_t;
     double last_cj;

@@ -1,0 +1,7 @@
+/* A library without a kernel. */
+int gust_no_kernel(void);
+
+int gust_no_kernel(void)
+{
+    return 0;
+}
