@@ -30,7 +30,7 @@ class DualPortMsc(Component):
     Q = Input("pu", "reactive power delivered to the machine")
     omega = Output("pu", "frequency of the converter's voltage, base of the rotor speed", start=1.2)
     V = Output("pu", "magnitude of the converter's voltage", start=1.0)
-    xi = Variable("pu", "filtered deviation of the DC voltage", nominal=0.1)
+    xi = Variable("pu", "filtered deviation of the DC voltage")
     Q_filtered = Variable("pu", "filtered reactive power Q_f")
 
     def equations(self) -> None:
