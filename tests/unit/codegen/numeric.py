@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gustform.language.component import Component
+from gustform.language.declare import Variable
 from gustform.language.operators import constants, table_calls
 from gustform.language.scope import Elaborated, elaborate
 from gustform_codegen.unit_type import UnitType
@@ -63,10 +64,9 @@ def solved_point(unit: UnitType, component: Component, seed: int = 0, given: dic
     paths = [u.path for u in unit.unknowns] + [f"der({u.path})" for u in unit.unknowns if u.der is not None]
     paths += [x.path for x in unit.externals] + [s.path for s in (*unit.inputs, *unit.discretes, *unit.parameters)]
     for k, u in enumerate(unit.unknowns):
-        start = (
-            component.at(u.declared.owner.path).start_value(u.declared.declaration) if u.declared.port is None else 0
-        )
-        values[k] = start or values[k]  # a declared start leads Newton to the solution that is meant
+        declaration: object = u.declared.declaration
+        if isinstance(declaration, Variable):  # a declared start leads Newton to the solution that is meant
+            values[k] = component.at(u.declared.owner.path).start_value(declaration) or values[k]
     for path, value in (given or {}).items():
         values[paths.index(path)] = value
     rows = [r.expression for r in unit.rows]
@@ -79,10 +79,10 @@ def solved_point(unit: UnitType, component: Component, seed: int = 0, given: dic
                 break
             where = np.flatnonzero(free)
             jacobian = np.zeros((residual.size, where.size))
-            for column, k in enumerate(where):  # central differences: exact enough for Newton to converge
+            for column, moving in enumerate(where):  # central differences: exact enough for Newton to converge
                 for sign in (1, -1):
                     moved = values.copy()
-                    moved[k] += sign * 1e-6
+                    moved[moving] += sign * 1e-6
                     jacobian[:, column] += sign * _evaluate(unit, component, rows, moved) / 2e-6
             values[where] -= np.linalg.lstsq(jacobian, residual, rcond=None)[0]
         assert np.max(np.abs(_evaluate(unit, component, rows, values))) < 1e-9, "the rows have no solution"

@@ -159,9 +159,8 @@ def test_sampled_blocks_know_their_period() -> None:
     assert unit.roots == []
     assert unit.whens[0].root == -1
     assert unit.parameters[unit.whens[0].period].path == "T"
-    for period in (lambda c: 2 * c.T, lambda c: c.T + c.T):
-        with pytest.raises(GustformError, match=r"GF1015.*the sample period must be a parameter"):
-            with_events(lambda c, period=period: c.sampled(period(c), {c.d: 1}))
+    with pytest.raises(GustformError, match=r"GF1015.*the sample period must be a parameter"):
+        with_events(lambda c: c.sampled(2 * c.T, {c.d: 1}))
 
 
 def test_clauses_of_parts_carry_their_path() -> None:

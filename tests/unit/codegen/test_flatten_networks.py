@@ -19,7 +19,6 @@ from tests.unit.codegen.numeric import assert_solves, solved_point
 KINDS: dict[str, type[Component]] = {
     "R": Resistor, "C": Capacitor, "L": Inductor, "V": VoltageSource, "I": CurrentSource
 }  # fmt: skip
-PARAMETER = {"R": "R", "C": "C", "L": "L", "V": "V", "I": "I"}
 
 
 @dataclass(frozen=True)
@@ -42,7 +41,8 @@ class Network:
         """The network as a unit with one terminal at each of `terminals`."""
         members: dict[str, Any] = {"ground": Part(Ground, "ground")}
         for k, b in enumerate(self.branches):
-            members[f"b{k}"] = Part(KINDS[b.kind], "a branch", **{PARAMETER[b.kind]: b.value})
+            value: dict[str, Any] = {b.kind: b.value}  # parameters have the name of their kind
+            members[f"b{k}"] = Part(KINDS[b.kind], "a branch", **value)
         for k in range(len(self.terminals)):
             members[f"t{k}"] = DcPort("a terminal")
 

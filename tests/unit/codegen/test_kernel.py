@@ -97,7 +97,8 @@ def test_jacobian(case: Case, seed: int, cj: float) -> None:
     point = case.point(seed)
     assert case.compiled.pattern == (case.kernel.jacobian_row, case.kernel.jacobian_column)
     found = case.compiled.jacobian(*point, cj=cj)
-    expected = case.evaluator.kernel_jacobian(*[a[:, None] for a in (*point, case.p)], cj)[:, 0]
+    y, yp, w, u, d, p = (a[:, None] for a in (*point, case.p))
+    expected = case.evaluator.kernel_jacobian(y, yp, w, u, d, p, cj)[:, 0]
     names = [f"{r}, {c}" for r, c in zip(*case.compiled.pattern, strict=True)]
     close(found / max(1.0, cj), expected / max(1.0, cj), names)
 
@@ -173,7 +174,6 @@ def test_limiters_on_either_side(case: Case) -> None:
 class TableOnly(Component):
     x = Variable("1", "x")
     y = Variable("1", "y")
-    value = None
     T = Parameter("s", "time", default=1.0)
     cp = Table("1", "1", "1", "table")
     seen = Variable("1", "value")
