@@ -88,9 +88,11 @@ def test_residual_equals_the_reference_at_random_states(wind: float, cache: Kern
         assert np.max(np.abs(result - flows) / largest) < 1e-10
 
 
-def simulate(wind: float, cache: KernelCache) -> tuple[Array, dict[str, Array], dict[str, float]]:
+def simulate(
+    wind: float, cache: KernelCache, curtailment: float = 0.1
+) -> tuple[Array, dict[str, Array], dict[str, float]]:
     """Times, channels and the nominal values of unknowns of the load step at rtol 1e-6."""
-    linked = build(mine.paper_system(wind), cache).linked
+    linked = build(mine.paper_system(wind, curtailment), cache).linked
     channels, _ = linked.select([path for path, _ in mine.UNKNOWNS.values()] + ["sg.frequency", "wt.P_gsc"])
     table = replace(steady_state(linked).table, channels=channels)
     times: list[Array] = []
@@ -134,6 +136,16 @@ def test_published_figures(wind: float, nadir: float, settled: float | None, cac
     assert np.min(frequency) == pytest.approx(nadir, abs=0.005)
     assert settled is None or frequency[-1] == pytest.approx(settled, abs=0.003)
     assert np.max(np.abs(frequency[time < ref.T_STEP] - 50.0)) < 1e-4
+
+
+def test_maximum_power_gives_inertia_only(cache: KernelCache) -> None:
+    _, values, _ = simulate(8.0, cache, curtailment=0.0)
+    other = ref.load_step(8.0, eta=1.0, method=ref.integrate_idas)
+    # 10 x rtol of 50 Hz
+    np.testing.assert_allclose(values["sg.frequency"], other["frequency"], atol=50.0 * 1e-5)
+    # project notes: 15 to 26 mHz above grid-following control's 49.397 Hz, and the same settling frequency
+    assert 0.015 < np.min(values["sg.frequency"]) - 49.397 < 0.026
+    assert values["sg.frequency"][-1] == pytest.approx(49.709, abs=0.003)
 
 
 def test_ten_turbines_are_one_aggregated(cache: KernelCache) -> None:
