@@ -10,7 +10,11 @@
 #pragma GCC diagnostic ignored "-Wpedantic"
 #pragma GCC diagnostic ignored "-Wstrict-prototypes"
 #endif
+#if defined(GUSTFORM_IDAS)
+#include <idas/idas.h> /* the same functions, and sensitivities that are not used here */
+#else
 #include <ida/ida.h>
+#endif
 #include <sundials/sundials_context.h>
 #include <sundials/sundials_linearsolver.h>
 #include <sundials/sundials_matrix.h>

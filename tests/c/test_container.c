@@ -120,11 +120,11 @@ static void flipped(void **state)
     size_t size = 0;
     unsigned char *bytes = writer_bytes(&builder.writer, &size);
     const size_t directory = 16 + 80 * (size_t)builder.writer.n_sections;
-    /* A fifth of the bits of the directory, a thirteenth of those of the data: primes, so that over the 80 bytes
+    /* An eleventh of the bits of the directory, a 29th of those of the data: primes, so that over the 80 bytes
      * of the entries and the 8 of the numbers all places get their turn. */
     for (size_t at = 0; at < size; ++at) {
         for (int bit = 0; bit < 8; ++bit) {
-            if ((8 * at + (size_t)bit) % (at < directory ? 5 : 13) != 0) {
+            if ((8 * at + (size_t)bit) % (at < directory ? 11 : 29) != 0) {
                 continue;
             }
             bytes[at] = (unsigned char)(bytes[at] ^ (1 << bit));
