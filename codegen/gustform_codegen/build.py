@@ -73,6 +73,8 @@ def _kept(system: System, wired: dict[str, frozenset[str]]) -> dict[str, frozens
 
 def build(system: System, cache: KernelCache) -> Built:
     """Compile what is not cached and link. Raises GF1xxx (declarations), GF3xxx (structure), GF4xxx (compiler)."""
+    if not system.components:
+        raise GustformError("GF3022", "the system has no components", hint="components: {...}")
     begin = time.perf_counter()
     compiled_before = cache.compilations
     for name, component in system.components.items():

@@ -150,6 +150,16 @@ class _Problem:
         np.add.at(result, self.position, entries[self.used])
         return result
 
+    def not_finite(self, x: Array) -> list[str]:
+        """Rows, flows and initial equations of instances that are no number at x."""
+        found = []
+        for t, evaluator, arguments in zip(self.linked.types, self.evaluators, self._arguments(x), strict=True):
+            texts = [r.text for r in t.unit.rows] + [f"the flow {f.path}" for f in t.unit.flows]
+            texts += [f"initial {r.text}" for r in t.unit.initial]
+            for row, k in np.argwhere(~np.isfinite(evaluator.residual(*arguments)))[:5]:
+                found.append(f"{t.names[k]}: {texts[row]}")
+        return found
+
     def column_name(self, column: int) -> str:
         if column < self.n:
             return self.linked.unknown_name(column)
@@ -318,9 +328,11 @@ def _report_failure(problem: _Problem, x: Array, residual: Array, status: str) -
         if problem.low[k] < problem.high[k]
         and (x[k] - problem.low[k] < 1e-6 * problem.scale[k] or problem.high[k] - x[k] < 1e-6 * problem.scale[k])
     ]
+    broken = problem.not_finite(x)
+    infinite = f" Not a number at all: {'; '.join(broken[:3])}." if broken else ""
     bounds = f" At a bound: {', '.join(at_bound[:5])}." if at_bound else ""
     raise GustformError(
         "GF5001",
-        f"no steady state was found (Ipopt: {status}). Worst equations: {rows}.{bounds}",
+        f"no steady state was found (Ipopt: {status}). Worst equations: {rows}.{infinite}{bounds}",
         hint="a feasible operating point (wind, load, curtailment), or better start values",
     )

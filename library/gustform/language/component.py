@@ -119,6 +119,7 @@ class Component:
                 modifiers[name] = declaration.check(value, f"{type(self).__name__}.{name}")
         self._modifiers: dict[str, Any] = modifiers
         self._parts: dict[str, Component] = {}
+        self._computing: set[str] = set()  # parameters whose value is being computed right now
 
     def _check_part(self, part: Part, value: Any) -> None:
         if isinstance(value, Mapping):
@@ -194,8 +195,13 @@ class Component:
         label = f"{self._path}.{name}" if self._path else name
         given = self._modifiers.get(name, declaration.start if declaration.free else declaration.default)
         if callable(given):
-            owner = self._parent if self.is_bound(name) else self
-            given = given(owner)
+            if name in self._computing:
+                raise GustformError("GF1022", f"{type(self).__name__}.{label} is computed from itself")
+            self._computing.add(name)
+            try:
+                given = given(self._parent if self.is_bound(name) else self)
+            finally:
+                self._computing.discard(name)
         if given is None:
             raise GustformError(
                 "GF2004",

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from numbers import Real
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from gustform.language.errors import GustformError
@@ -96,7 +97,7 @@ class Parameter(Declaration):
             return value
         if isinstance(value, bool) and self.structural:
             return value
-        if isinstance(value, bool) or not isinstance(value, int | float):
+        if isinstance(value, bool) or not isinstance(value, Real):
             raise GustformError(
                 "GF2001",
                 f"{path} must be a number in {self.unit} ({self.description}); got {value!r}",

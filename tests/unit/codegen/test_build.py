@@ -6,10 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from gustform.language import Component, Parameter, Variable
+from gustform.language import Component, GustformError, Parameter, Variable
 from gustform.language.system import Constant, System
 from gustform_codegen.build import build, unit_type
 from gustform_codegen.cache import KernelCache
+from gustform_codegen.initial import steady_state
 from tests.unit.codegen.circuits import Follower, IdealSource, Load, Resistor, Storage
 from tests.unit.codegen.compiled import INCLUDE
 
@@ -104,6 +105,25 @@ def test_types_are_flattened_once_per_process() -> None:
     second, _ = unit_type(Storage(R=2.0))
     assert first is second
     assert unit_type(Storage(), keep=frozenset({"soc"}))[0] is not first
+
+
+def test_an_empty_system_is_refused(fresh: KernelCache) -> None:
+    with pytest.raises(GustformError, match="GF3022"):
+        build(System(), fresh)
+
+
+def test_a_system_without_unknowns_can_be_built(fresh: KernelCache) -> None:
+    class Still(Component):
+        x = Variable("1", "a constant")
+
+        def equations(self) -> None:
+            self.eq(self.x, 2)
+
+    s = System()
+    s.add("still", Still())
+    linked = build(s, fresh).linked
+    assert linked.table.n_unknowns == 0
+    assert steady_state(linked).table.start.size == 0
 
 
 def test_one_component_may_stand_for_many_instances(fresh: KernelCache) -> None:

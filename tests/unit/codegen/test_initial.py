@@ -276,6 +276,19 @@ def test_an_integrator_with_a_constant_input_never_rests(cache: KernelCache) -> 
     assert "it: T * der(x) = u (test_initial.py:" in failure(s, cache)
 
 
+def test_a_division_by_a_parameter_that_is_zero_names_the_instance(cache: KernelCache) -> None:
+    class Unguarded(Load):
+        R = Parameter("ohm", "resistance", default=0.0)
+
+    s = System()
+    s.add("source", IdealSource())
+    s.add("good", Load())
+    s.add("bad", Unguarded())
+    s.connect("source.pin", "good.pin")
+    s.connect("source.pin", "bad.pin")
+    assert "Not a number at all: bad: the flow pin.i." in failure(s, cache)
+
+
 def test_a_start_outside_the_domain_of_an_equation_does_not_crash(cache: KernelCache) -> None:
     class Logarithm(Component):
         T = Parameter("s", "time constant", default=1.0)

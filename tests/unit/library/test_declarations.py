@@ -113,6 +113,22 @@ def test_computed_values_are_checked_too() -> None:
     assert "c must be a finite number" in refused("GF2002", lambda: Wrong().c)
 
 
+def test_values_computed_in_a_circle() -> None:
+    class Circle(Component):
+        a = Parameter("1", "one", default=lambda self: self.b + 1)
+        b = Parameter("1", "another", default=lambda self: self.a + 1)
+
+    assert "Circle.a is computed from itself" in refused("GF1022", lambda: Circle().a)
+    assert Circle(b=1.0).a == 2.0
+
+
+@pytest.mark.parametrize("value", [np.float64(2.5), np.float32(2.5), np.int64(2), 2])
+def test_numbers_of_numpy_are_numbers(value: Any) -> None:
+    machine = Machine(D=value)
+    assert float(value) == machine.D
+    assert type(machine.D) is float
+
+
 def test_a_free_parameter_needs_a_start() -> None:
     assert "start=" in refused("GF1003", lambda: Parameter("W", "set point", free=True))
 
