@@ -48,7 +48,7 @@ class KernelCache:
         return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
 
     def get(self, source: str, type_name: str) -> Path:
-        """The shared library for a kernel's C text, compiled if it is not there whole. GF4003 without a folder."""
+        """The shared library for a kernel's C text, compiled if it is not there whole. GF4005 without a folder."""
         path = self.folder / "kernels" / f"{self.key(source)}.so"
         if not _intact(path):
             try:
@@ -56,7 +56,7 @@ class KernelCache:
                 _seal(path)
             except OSError as failure:
                 raise GustformError(
-                    "GF4003",
+                    "GF4005",
                     f"compiled kernels cannot be kept in {path.parent}: {failure}",
                     hint="GUSTFORM_CACHE=/a/folder/to/write/to",
                 ) from failure

@@ -141,7 +141,7 @@ class System:
         declaration = self._input(path)
         if path in self.signals:
             raise GustformError(
-                "GF2012", f"{path} is driven by {self.signals[path]} already", hint="one source for each input"
+                "GF2014", f"{path} is driven by {self.signals[path]} already", hint="one source for each input"
             )
         value = source.value if isinstance(source, Constant) else source.operating_value
         if not math.isfinite(value):
@@ -158,7 +158,7 @@ class System:
         self.split(source)
         if target in self.inputs:
             raise GustformError(
-                "GF2012", f"{target} is driven by a constant or a series already", hint="one source for each input"
+                "GF2014", f"{target} is driven by a constant or a series already", hint="one source for each input"
             )
         self.signals[target] = source
 

@@ -102,7 +102,7 @@ def test_a_cache_that_cannot_be_written(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(GustformError) as refusal:
         KernelCache(INCLUDE, tmp_path / "file").get(SOURCE, "Load")
-    assert refusal.value.code == "GF4003"
+    assert refusal.value.code == "GF4005"
     assert str(tmp_path / "file") in str(refusal.value)
     assert "GUSTFORM_CACHE" in refusal.value.hint
     assert (tmp_path / "file").read_text() == "in the way"
