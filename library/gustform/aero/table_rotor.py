@@ -20,7 +20,7 @@ CP_FLOOR = -0.2
 
 
 class TableRotor(Rotor):
-    """Rotor with Cp from a table, e.g. a `Cp_Ct_Cq` file.
+    """Rotor with Cp from a table, such as a `Cp_Ct_Cq` file.
 
         Cp = table(lambda, beta)
 

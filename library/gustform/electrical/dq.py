@@ -52,7 +52,7 @@ class RotorFrame(Component):
 
 
 class DqImpedance(Component):
-    """Series impedance in the rotor frame, e.g. the step-up transformer of a machine.
+    """Series impedance in the rotor frame: the step-up transformer of a machine.
 
         v_a - v_b = (r + jx) i        i from a to b;  in d-q: v_d: r i_d - x i_q,  v_q: r i_q + x i_d
 
