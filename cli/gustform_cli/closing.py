@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+from gustform_cli.progress import times
 from gustform_cli.simulate import Outcome
 
 
@@ -27,7 +28,7 @@ def closing_lines(outcome: Outcome) -> str:
         numbers.append(f"nadir {frequency['nadir_hz']:.3f} Hz at {frequency['nadir_time_s']:.2f} s")
     if frequency.get("settle_hz") is not None:
         numbers.append(f"settling {frequency['settle_hz']:.3f} Hz")
-    numbers.append(f"{summary.real_time_factor:.4g} x real time")
+    numbers.append(f"{times(summary.real_time_factor)} x real time")
     if summary.status != "completed":
         numbers.insert(0, f"{summary.status} at {summary.simulated_seconds:.3f} s")
     return "\n".join([*lines, ", ".join(numbers)])

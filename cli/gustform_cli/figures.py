@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from gustform.language.errors import GustformError
 from gustform_cli.frequency import SETTLE_AFTER
+from gustform_cli.progress import times
 from gustform_cli.run_data import Curve, RunData
 
 if TYPE_CHECKING:
@@ -91,13 +92,13 @@ _PANELS = (
 )
 
 
+# Panels with their curves: label and values.
+Filled = list[tuple[_Panel, list[tuple[str, NDArray[np.float64]]]]]
+
+
 def draw(result: Path, figure: Path) -> Path:
     """Draw the figure of a result file. GF7002 if it is none or has nothing to draw, GF7001 if it cannot be saved."""
-    import matplotlib as mpl
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    with RunData(result) as run, mpl.rc_context(_STYLE):
+    with RunData(result) as run:
         panels = _filled(run)
         if not panels:
             raise GustformError(
@@ -105,6 +106,16 @@ def draw(result: Path, figure: Path) -> Path:
                 f"{str(result)!r} must have a channel that the figure shows; it has {', '.join(run.names()[:8])}",
                 hint="output.channels: ['*']",
             )
+        _draw_panels(panels, run, figure)
+    return figure
+
+
+def _draw_panels(panels: Filled, run: RunData, figure: Path) -> None:
+    import matplotlib as mpl  # a second: only when there is something to draw
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    with mpl.rc_context(_STYLE):
         rows = -(-len(panels) // 2)
         canvas = Figure(figsize=(10.0, 0.9 + 2.3 * rows))
         FigureCanvasAgg(canvas)
@@ -127,7 +138,6 @@ def draw(result: Path, figure: Path) -> Path:
             raise GustformError(
                 "GF7001", f"the figure {str(figure)!r} cannot be written; {error}", hint="--out with another file"
             ) from None
-    return figure
 
 
 def _heading(run: RunData) -> str:
@@ -141,11 +151,8 @@ def _footing(run: RunData) -> str:
     parts = [f"gustform {versions['gustform']}"] if "gustform" in versions else []
     if statistics.get("steps"):
         parts.append(f"{statistics['unknowns']} unknowns, {statistics['steps']} steps")
-        parts.append(f"{statistics['real_time_factor']:.0f} x real time")
+        parts.append(f"{times(statistics['real_time_factor'])} x real time")
     return "   ".join(parts)
-
-
-Filled = list[tuple[_Panel, list[tuple[str, NDArray[np.float64]]]]]
 
 
 def _filled(run: RunData) -> Filled:

@@ -40,14 +40,14 @@ def link(assembled: Assembled) -> Model:
     try:
         built = build(assembled.system, KernelCache(include_dir()))
     except GustformError as error:
-        raise _placed(error, assembled) from None
+        raise placed(error, assembled) from None
     except FileNotFoundError as error:  # the runtime has not been built
         raise GustformError("GF4003", str(error), hint="make setup") from None
     channels, aliases = _select(assembled, built)
     return Model(assembled, built, channels, aliases)
 
 
-def _placed(error: GustformError, assembled: Assembled) -> GustformError:
+def placed(error: GustformError, assembled: Assembled) -> GustformError:
     """An error of the model with the file it came from, where it has no place of its own."""
     place = error.place or Place(assembled.document.file)
     return GustformError(error.code, error.message, hint=error.hint, place=place)

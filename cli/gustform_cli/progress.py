@@ -13,6 +13,11 @@ if TYPE_CHECKING:
 _LINE_EVERY = 5.0  # s of waiting between lines
 
 
+def times(factor: float) -> str:
+    """A real-time factor with three digits: 0.482, 48.2, 4820."""
+    return f"{factor:.3g}" if factor < 1000.0 else f"{float(f'{factor:.3g}'):.0f}"
+
+
 class RunProgress:
     """Shows simulated time, real-time factor and time left. Use as a context; `show` at any rate."""
 
@@ -34,7 +39,6 @@ class RunProgress:
                 BarColumn(bar_width=None),
                 TextColumn("{task.fields[state]}"),
                 console=Console(stderr=True),
-                transient=True,
             )
             self._bar.start()
             self._task = self._bar.add_task("", total=self.until, state="")
@@ -65,5 +69,5 @@ class RunProgress:
             left = (self.until - simulated) / factor
             hours, rest = divmod(round(left), 3600)
             clock = f"{hours}:{rest // 60:02d}:{rest % 60:02d}" if hours else f"{rest // 60}:{rest % 60:02d}"
-            text += f", {factor:.3g} x real time, {clock} left"
+            text += f", {times(factor)} x real time, {clock} left"
         return text

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import math
+import sys
 import threading
 import time
 from collections.abc import Sequence
@@ -19,21 +20,22 @@ from gustform.language.errors import GustformError
 from gustform_cli.assemble import Assembled
 from gustform_cli.frequency import FrequencyWatch
 from gustform_cli.interrupt import Interrupt
-from gustform_cli.model import Model, link, load
+from gustform_cli.model import Model, link, load, placed
 from gustform_cli.names import short_aliases
 from gustform_cli.progress import RunProgress
 from gustform_cli.result import Quantity, ResultWriter, prepare_folder
-from gustform_cli.summary import Summary, solver_figures
+from gustform_cli.summary import Summary, solver_figures, write_summary
 from gustform_cli.versions import versions
 from gustform_codegen.initial import steady_state
 from gustform_codegen.table import SystemTable
 
 if TYPE_CHECKING:
-    from gustform_runtime import Simulation
+    from gustform_runtime import Simulation, Status
 
 _BLOCK_BYTES = 1 << 20  # of one block of rows, at most: some 20 rows of a thousand turbines
 _BLOCKS = 20  # of a run, at least: what a killed run may lose
 _BLOCK_ROWS = (1024, 4096)  # fewer cost time, more cost memory
+FIGURE = "figure.png"
 _POLL = 0.1  # s between looks at the time reached
 
 
@@ -56,18 +58,26 @@ def simulate(file: Path, out: Path, overrides: Sequence[str], interrupt: Interru
     prepare_folder(out)
     model = link(assembled)
     linked = model.built.linked
-    table = steady_state(linked).table.with_channels(model.channels)
+    try:
+        table = steady_state(linked).table.with_channels(model.channels)
+    except GustformError as unsolved:
+        raise placed(unsolved, assembled) from None
     build_seconds = time.perf_counter() - begin
+    print(
+        f"model: {len(linked.types)} types ({model.built.compilations} compiled now), {table.n_instances} units, "
+        f"{table.n_unknowns} unknowns; built in {build_seconds:.2f} s",
+        file=sys.stderr,
+    )
     run = _Run(assembled, model, table, out, interrupt)
     summary, result, error = run.execute(build_seconds)
-    summary_file = out / "summary.json"
-    summary_file.write_text(json.dumps(summary.as_dict(), indent=2) + "\n", encoding="utf-8")
-    drawn = None
-    if figure and run.writer.rows > 1:
-        from gustform_cli.figures import draw  # a second of imports, after the run
+    summary_file = write_summary(summary, out)
+    drawn = out / FIGURE
+    drawn.unlink(missing_ok=True)  # one of an earlier run would not belong to this result
+    if not figure or run.writer.rows < 2:
+        return Outcome(result, summary_file, None, summary, error)
+    from gustform_cli.figures import draw  # a second of imports, after the run
 
-        drawn = draw(result, out / "figure.png")
-    return Outcome(result, summary_file, drawn, summary, error)
+    return Outcome(result, summary_file, draw(result, drawn), summary, error)
 
 
 class _Run:
@@ -163,7 +173,7 @@ class _Run:
             begin = time.perf_counter()
             try:
                 simulation.initialise(0.0)
-                self.stopped_early = bool(simulation.advance(self.until))
+                self._judge(simulation.advance(self.until), simulation.message)
             except BaseException as error:
                 self.failure = error
             self.wall_seconds = time.perf_counter() - begin
@@ -175,6 +185,13 @@ class _Run:
             while worker.is_alive():
                 worker.join(_POLL)
                 progress.show(simulation.time)
+
+    def _judge(self, status: Status, message: str) -> None:
+        """What a stop before the end means: a request is an interruption, anything else went wrong."""
+        if status.name == "STOP_REQUESTED":
+            self.stopped_early = True
+        elif status != 0:
+            raise GustformError(f"GF60{int(status):02d}", message, hint="a look at the wind and its end")
 
     def _explained(self) -> GustformError | None:
         """What made the run fail, as an error of ours; defects of gustform itself are raised."""
