@@ -182,6 +182,12 @@ class Run(_Part):
 
     until: Duration = Field(description="end of the simulated time")
     rtol: Tolerance = Field(1e-6, description="relative tolerance of the solver")
+    atol: Tolerance | None = Field(
+        None, description="absolute tolerance in nominal values of each unknown; a hundredth of rtol if left out"
+    )
+    limiters: Literal["pass", "locate"] = Field(
+        "pass", description="pass over the bends of limiters under error control, or locate each and restart there"
+    )
     max_step: Duration | None = Field(None, description="longest step of the solver")
 
 

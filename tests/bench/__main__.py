@@ -27,13 +27,14 @@ from tests.bench.peers import BareProgram, CasadiIdas, Wind
 from tests.support.case import SCENARIOS, Case, open_case
 
 _RTOL = 1e-6
+_ATOL = 1e-6  # of nominal, for all sides
 console = Console(width=120)
 
 
 def _timed(case: Case, until: float, **sink: float) -> tuple[float, dict[str, int | float], Any]:
     """Seconds of the integration alone, statistics, unknowns at the end; with `every=` rows are produced too."""
     channels = tuple(c.name for c in case.model.channels) if sink else ()
-    with case.simulation(channels, rtol=_RTOL) as simulation:
+    with case.simulation(channels, rtol=_RTOL, atol=_ATOL) as simulation:
         if sink:
             simulation.set_sink(sink["every"], lambda t, rows: None)
         simulation.initialise(0.0)
@@ -70,7 +71,7 @@ def bare(hours: float, repeats: int, folder: Path) -> dict[str, Any]:
     for _ in range(repeats):
         seconds, statistics, final = _timed(case, until)
         ours.append(seconds)
-        peer = program.run(wind, until, _RTOL)
+        peer = program.run(wind, until, _RTOL, _ATOL)
         theirs.append(peer.solve_seconds)
         stored.append(_timed(case, until, every=every)[0])
     steps = int(statistics["steps"])
@@ -89,7 +90,7 @@ def bare(hours: float, repeats: int, folder: Path) -> dict[str, Any]:
         "difference_at_end_of_nominal": _difference(final, peer.final, case.table.nominal),
     }
     _table(
-        f"(a) turbulent scenario, {hours:g} h of 20 Hz wind, {result['unknowns']} unknowns, rtol {_RTOL:g}",
+        f"(a) turbulent scenario, {hours:g} h of 20 Hz wind, {result['unknowns']} unknowns, rtol {_RTOL:g}, atol {_ATOL:g} of nominal",
         ["", "steps", "us/step", "x real time", "bare / gustform (goal: 3 or more)"],
         [
             ["bare IDA + KLU program", str(peer.steps), f"{result['us_per_step']['bare']:.2f}",
@@ -120,7 +121,7 @@ def casadi(counts: list[int], seconds: dict[int, float], repeats: int) -> dict[s
         entry: dict[str, Any] = {"build_seconds": min(build), "solve_seconds": mine}
         rows.append([f"N = {n}: gustform", f"{min(build):.2f}", "1", f"{mine:.3f}", "1", str(ours[0][1]["steps"]), ""])
         for jit in (False, True):
-            peer = CasadiIdas(case.model.built.linked, case.table, wind, until, _RTOL, jit=jit)
+            peer = CasadiIdas(case.model.built.linked, case.table, wind, until, _RTOL, _ATOL, jit=jit)
             runs = [peer.run() for _ in range(repeats if n < 100 else 1)]
             theirs = min(r.solve_seconds for r in runs)
             label = "casadi_jit" if jit else "casadi"

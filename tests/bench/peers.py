@@ -45,11 +45,6 @@ class Measured:
     final: NDArray[np.float64]
 
 
-def _tolerances(table: SystemTable, rtol: float) -> NDArray[np.float64]:
-    """The absolute tolerances gustform uses: rtol times nominal."""
-    return rtol * table.nominal
-
-
 class BareProgram:
     """Generates, compiles and runs the bare program."""
 
@@ -75,7 +70,7 @@ class BareProgram:
         self.folder = folder
         self.build_seconds = time.perf_counter() - begin
 
-    def run(self, wind: Wind, until: float, rtol: float) -> Measured:
+    def run(self, wind: Wind, until: float, rtol: float, atol: float) -> Measured:
         """One run as a process of its own; the seconds are those of the integration alone."""
         f, table = self.flat, self.table
         numbers: list[float] = [
@@ -83,7 +78,7 @@ class BareProgram:
             wind.value.shape[0],
         ]  # fmt: skip
         numbers += f.changing_start
-        for y, d, a in zip(table.start, table.differential, _tolerances(table, rtol), strict=True):
+        for y, d, a in zip(table.start, table.differential, atol * table.nominal, strict=True):
             numbers += [float(y), float(d), float(a)]
         for at, index, value in f.changes:
             numbers += [at, index, value]
@@ -100,7 +95,7 @@ class BareProgram:
 class CasadiIdas:
     """CasADi's idas on the same equations, with the wind as a linear interpolant of time."""
 
-    def __init__(self, linked: Linked, table: SystemTable, wind: Wind, until: float, rtol: float, *, jit: bool) -> None:
+    def __init__(self, linked: Linked, table: SystemTable, wind: Wind, until: float, rtol: float, atol: float, *, jit: bool) -> None:
         self.table = table
         begin = time.perf_counter()
         self.flat = flatten_system(linked, table)
@@ -117,7 +112,7 @@ class CasadiIdas:
         problem = {"x": x, "z": z, "t": t, "p": changing, "ode": ode, "alg": alg}
         options: dict[str, Any] = {
             "reltol": rtol,
-            "abstol": rtol,
+            "abstol": atol,
             "max_num_steps": 100_000_000,
             "suppress_algebraic": True,
             "calc_ic": True,
@@ -126,7 +121,7 @@ class CasadiIdas:
             options |= {
                 "jit": True,
                 "compiler": "shell",
-                "jit_options": {"flags": ["-O3", "-march=native"], "verbose": False},
+                "jit_options": {"flags": ["-O2", "-march=native"], "verbose": False},
             }
         self.pieces = [c[0] for c in self.flat.changes if c[0] < until]
         edges = [0.0, *sorted(set(self.pieces)), until]
