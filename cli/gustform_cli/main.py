@@ -6,6 +6,7 @@ or the run failed, 2 usage or scenario, 130 interrupted.
 
 from __future__ import annotations
 
+import io
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -150,4 +151,7 @@ def _exit_code(error: object) -> int:
 
 def main() -> None:
     """Entry point of the installed command."""
+    # A terminal that knows no dash must not turn an error message into another error.
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")
     app()

@@ -153,6 +153,9 @@ class _Run:
     def _prepare(self, simulation: Simulation) -> None:
         run = self.assembled.scenario.run
         simulation.set_option("rtol", run.rtol)
+        simulation.set_option("kinks", float(run.limiters == "locate"))
+        if run.atol is not None:
+            simulation.set_option("atol", run.atol)
         if run.max_step is not None:
             simulation.set_option("max_step", run.max_step)
         for number, series in enumerate(self.table.series):

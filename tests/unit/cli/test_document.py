@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import hypothesis
 import pytest
 
 from gustform.language.errors import GustformError
@@ -109,3 +110,13 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
     latin.write_bytes(b"name: caf\xe9\n")
     with pytest.raises(GustformError, match="UTF-8"):
         document.read(latin)
+
+
+@hypothesis.given(text=hypothesis.strategies.text(alphabet="ab:-[]{}&*!#|>'\"%@,? \n\t1.", max_size=40))
+def test_no_text_does_harm(text: str) -> None:
+    caught: GustformError | None = None
+    try:
+        assert isinstance(document.parse(text, "s.yaml", [text] if "=" in text else []).plain(), dict)
+    except GustformError as error:
+        caught = error
+    assert caught is None or (caught.code in {"GF2102", "GF2103", "GF2104", "GF2105"} and caught.place is not None)

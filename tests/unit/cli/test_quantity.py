@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hypothesis
 import pytest
 
 from gustform.language.errors import GustformError
@@ -84,3 +85,14 @@ def test_refused(text: object, unit: str, code: str) -> None:
     assert "load.P must" in caught.value.message
     assert "active power" in caught.value.message
     assert caught.value.hint
+
+
+@hypothesis.given(text=hypothesis.strategies.text(max_size=30), number=hypothesis.strategies.floats())
+def test_no_text_does_harm(text: str, number: float) -> None:
+    for value in (text, f"5 {text}", f"{number} {text}", f"{number} MW", number):
+        code = ""
+        try:
+            assert isinstance(parse_quantity(value, "W", "x"), float)
+        except GustformError as error:
+            code = error.code
+        assert code in {"", "GF2001", "GF2002", "GF2301", "GF2302", "GF2303"}
