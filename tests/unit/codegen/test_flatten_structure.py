@@ -208,22 +208,23 @@ def test_a_state_row_reads_derivative_minus_right_hand_side() -> None:
         assert ca.jacobian(unit.rows[0].expression, der).is_one()
 
 
-@pytest.mark.parametrize("n", [2, 3])
+@pytest.mark.parametrize("n", [2, 3, 4])  # 4: three are left after tearing, the largest block solved by symbols
 def test_linear_loops_are_solved(n: int) -> None:
-    matrix = np.array([[4.0, 1.0, -2.0], [2.0, -5.0, 1.0], [1.0, 2.0, 6.0]])[:n, :n]
+    matrix = np.array([[4.0, 1.0, -2.0, 0.5], [2.0, -5.0, 1.0, 3.0], [1.0, 2.0, 6.0, -1.0], [2.5, 1.5, -3.0, 7.0]])
+    matrix, names = matrix[:n, :n], "abce"[:n]
 
-    @unit_of(*"abc"[:n], "u", "p")
+    @unit_of(*names, "u", "p")
     def Loop(self: Any) -> None:
-        x = [self.a, self.b, self.c][:n] if n == 3 else [self.a, self.b]
         for row in range(n):
-            self.eq(sum(float(matrix[row, k]) * x[k] for k in range(n)), self.u + row * self.p)
+            total = sum(float(matrix[row, k]) * getattr(self, name) for k, name in enumerate(names))
+            self.eq(total, self.u + row * self.p)
 
     unit = flatten(Loop())
     assert unit.unknowns == []
     assert unit.substituted == n
     point = solved_point(unit, Loop(), given={"u": 7.0})
     expected = np.linalg.solve(matrix, 7.0 + 3.0 * np.arange(n))
-    assert [point[name] for name in "abc"[:n]] == pytest.approx(expected.tolist(), rel=1e-12)
+    assert [point[name] for name in names] == pytest.approx(expected.tolist(), rel=1e-12)
 
 
 def test_a_larger_dense_linear_loop_is_torn_but_right() -> None:
