@@ -33,7 +33,7 @@ static gust_status write_rows(gust_sim *sim, double t)
     return GUST_OK;
 }
 
-static double next_event(const gust_sim *sim)
+double gust_next_event(const gust_sim *sim)
 {
     return fmin(gust_sampler_next(&sim->sampler), gust_series_next(&sim->system.series));
 }
@@ -41,7 +41,7 @@ static double next_event(const gust_sim *sim)
 /* Step for the first step after an event at t (the integrator itself would guess from y' alone). */
 static double first_step(gust_sim *sim, double t, double until)
 {
-    const double next = fmin(next_event(sim), sim->system.series.end);
+    const double next = fmin(sim->next_event, sim->system.series.end);
     double longest = 0.01 * (until - t);
     longest = next > t && next - t < longest ? next - t : longest;
     longest = longest > 0.0 ? longest : 1e-3;
@@ -73,6 +73,7 @@ static gust_status handle_event(gust_sim *sim, double until)
         gust_vector_data(solver->y), gust_vector_data(solver->yp), &changed, sim->message, sizeof sim->message);
     sim->pending = false;
     sim->root_found = false;
+    sim->next_event = gust_next_event(sim);
     if (status == GUST_NOT_CONSISTENT || status == GUST_SINGULAR || status == GUST_NOT_FINITE) {
         return GUST_RESTART_FAILED;
     }
@@ -128,19 +129,17 @@ gust_status gust_integrate(gust_sim *sim, double until)
             gust_text(sim->message, sizeof sim->message, "stopped at t = %.9g s on request", now);
             return GUST_STOP_REQUESTED;
         }
-        double event = next_event(sim);
-        if (sim->pending || event <= gust_moment_end(solver->t)) {
+        if (sim->pending || sim->next_event <= gust_moment_end(solver->t)) {
             status = handle_event(sim, until);
             if (status != GUST_OK) {
                 return status;
             }
-            event = next_event(sim);
-            if (event <= gust_moment_end(solver->t)) {
+            if (sim->next_event <= gust_moment_end(solver->t)) {
                 continue;
             }
         }
-        switch (
-            gust_solver_step(solver, fmin(event, series->end), &status, sim->message, sizeof sim->message)) {
+        switch (gust_solver_step(solver, fmin(sim->next_event, series->end), &status, sim->message,
+                                 sizeof sim->message)) {
         case GUST_STEP_TAKEN:
             break;
         case GUST_STEP_AT_STOP:

@@ -53,10 +53,12 @@ static bool allocate_factors(gust_lu *lu, int32_t n_lower, int32_t n_upper)
 
 void gust_lu_free(gust_lu *lu)
 {
-    void *const blocks[] = {lu->row_of,    lu->column_of, lu->a_start, lu->a_source, lu->a_row,
-                            lu->l_start,   lu->u_start,   lu->l_row,   lu->l_column, lu->l_value,
-                            lu->u_row,     lu->u_column,  lu->u_value, lu->pivot,    lu->pivot_inverse,
-                            lu->row_scale, lu->work,      lu->inverse};
+    void *const blocks[] = {
+        lu->row_of,       lu->column_of,  lu->a_start,       lu->a_source,    lu->a_row,        lu->l_start,
+        lu->u_start,      lu->l_row,      lu->l_column,      lu->l_value,     lu->u_row,        lu->u_column,
+        lu->u_value,      lu->pivot,      lu->pivot_inverse, lu->row_scale,   lu->work,         lu->inverse,
+        lu->lower_source, lu->lower_row,  lu->lower_column,  lu->lower_value, lu->upper_source, lu->upper_row,
+        lu->upper_column, lu->upper_value};
     for (size_t k = 0; k < sizeof blocks / sizeof blocks[0]; ++k) {
         gust_release(blocks[k]);
     }
@@ -229,6 +231,92 @@ static bool find_pattern(gust_lu *lu)
     return good;
 }
 
+/* -- order of the entries in a solve -------------------------------------------------------------------- */
+
+enum {
+    CHUNK = 256
+}; /* columns among which entries change their order: x of a chunk fits in the nearest cache */
+
+/* One triangular factor on its way into solving order. */
+typedef struct ordering {
+    const int32_t *start; /* of the entries of a column */
+    const int32_t *end;
+    const int32_t *row;
+    int32_t *source; /* result */
+    int32_t *target_row;
+    int32_t *target_column;
+    int32_t *level; /* [n] how many columns of its chunk must be used one after the other before this one */
+    int32_t used;
+} ordering;
+
+/* Columns first, first + step, ... of one chunk, in the order of a solve. */
+static void order_chunk(ordering *order, int32_t first, int32_t step, int32_t count)
+{
+    int32_t deepest = 0;
+    for (int32_t i = 0, k = first; i < count; ++i, k += step) {
+        for (int32_t p = order->start[k]; p < order->end[k]; ++p) {
+            const int32_t row = order->row[p];
+            if (order->level[row] <= order->level[k]) {
+                order->level[row] = order->level[k] + 1;
+            }
+        }
+        deepest = order->level[k] > deepest ? order->level[k] : deepest;
+    }
+    for (int32_t level = 0; level <= deepest; ++level) {
+        for (int32_t i = 0, k = first; i < count; ++i, k += step) {
+            for (int32_t p = order->start[k]; order->level[k] == level && p < order->end[k]; ++p) {
+                order->source[order->used] = p;
+                order->target_row[order->used] = order->row[p];
+                order->target_column[order->used++] = k;
+            }
+        }
+    }
+}
+
+static void order_lower(gust_lu *lu, int32_t *level)
+{
+    ordering order = {lu->l_start,   lu->l_start + 1,  lu->l_row, lu->lower_source,
+                      lu->lower_row, lu->lower_column, level,     0};
+    for (int32_t first = 0; first < lu->n; first += CHUNK) {
+        memset(level, 0, (size_t)lu->n * sizeof *level);
+        order_chunk(&order, first, 1, lu->n - first < CHUNK ? lu->n - first : CHUNK);
+    }
+}
+
+static void order_upper(gust_lu *lu, int32_t *level)
+{
+    ordering order = {lu->u_start + 1, lu->u_start,      lu->u_row, lu->upper_source,
+                      lu->upper_row,   lu->upper_column, level,     0};
+    for (int32_t last = lu->n - 1; last >= 0; last -= CHUNK) {
+        memset(level, 0, (size_t)lu->n * sizeof *level);
+        order_chunk(&order, last, -1, last + 1 < CHUNK ? last + 1 : CHUNK);
+    }
+}
+
+static bool order_entries(gust_lu *lu)
+{
+    const size_t n_lower = (size_t)lu->l_start[lu->n];
+    const size_t n_upper = (size_t)lu->u_start[0];
+    int32_t *level = integers((size_t)lu->n);
+    lu->lower_source = integers(n_lower);
+    lu->lower_row = integers(n_lower);
+    lu->lower_column = integers(n_lower);
+    lu->lower_value = gust_allocate(n_lower, sizeof(double));
+    lu->upper_source = integers(n_upper);
+    lu->upper_row = integers(n_upper);
+    lu->upper_column = integers(n_upper);
+    lu->upper_value = gust_allocate(n_upper, sizeof(double));
+    const bool good = level != NULL && lu->lower_source != NULL && lu->lower_row != NULL &&
+                      lu->lower_column != NULL && lu->lower_value != NULL && lu->upper_source != NULL &&
+                      lu->upper_row != NULL && lu->upper_column != NULL && lu->upper_value != NULL;
+    if (good) {
+        order_lower(lu, level);
+        order_upper(lu, level);
+    }
+    gust_release(level);
+    return good;
+}
+
 bool gust_lu_plan(gust_lu *lu, const int32_t *column_start, const int32_t *row_index, const double *values,
                   klu_symbolic *symbolic, klu_numeric *numeric, klu_common *common)
 {
@@ -243,7 +331,7 @@ bool gust_lu_plan(gust_lu *lu, const int32_t *column_start, const int32_t *row_i
             pivot_of_row[lu->row_of[k]] = k;
         }
         take_sources(lu, column_start, row_index, values, pivot_of_row);
-        good = find_pattern(lu);
+        good = find_pattern(lu) && (lu->inverse != NULL || order_entries(lu));
     }
     gust_release(pivot_of_row);
     if (!good) {
@@ -294,6 +382,14 @@ bool gust_lu_factor(gust_lu *lu, const double *values)
         for (int32_t p = l_start[k]; p < l_start[k + 1]; ++p) {
             l_value[p] = work[l_row[p]] * inverse;
             work[l_row[p]] = 0.0;
+        }
+    }
+    if (lu->inverse == NULL) {
+        for (int32_t e = 0; e < l_start[n]; ++e) {
+            lu->lower_value[e] = l_value[lu->lower_source[e]];
+        }
+        for (int32_t e = 0; e < lu->u_start[0]; ++e) {
+            lu->upper_value[e] = u_value[lu->upper_source[e]];
         }
     }
     return true;
@@ -418,26 +514,31 @@ static void apply_inverse(const gust_lu *lu, const double *right, double *soluti
     }
 }
 
+/* One loop over all entries instead of one for each column: columns are so short that the loops themselves
+ * would take longer than what is in them. */
+static inline void eliminate(double *x, const int32_t *row, const int32_t *column, const double *value,
+                             int32_t count)
+{
+    for (int32_t e = 0; e < count; ++e) {
+        x[row[e]] -= value[e] * x[column[e]];
+    }
+}
+
 static void solve_triangular(const gust_lu *lu, const double *right, double *solution)
 {
     const int32_t n = lu->n;
+    const bool small = lu->inverse != NULL;
     double *restrict x = lu->work;
     for (int32_t k = 0; k < n; ++k) {
         x[k] = right[lu->row_of[k]];
     }
-    /* One loop over all entries instead of one for each column: columns are so short that the loops
-     * themselves would take longer than what is in them. */
-    const int32_t n_lower = lu->l_start[n];
-    for (int32_t e = 0; e < n_lower; ++e) {
-        x[lu->l_row[e]] -= lu->l_value[e] * x[lu->l_column[e]];
-    }
+    eliminate(x, small ? lu->l_row : lu->lower_row, small ? lu->l_column : lu->lower_column,
+              small ? lu->l_value : lu->lower_value, lu->l_start[n]);
     for (int32_t k = 0; k < n; ++k) {
         x[k] *= lu->pivot_inverse[k];
     }
-    const int32_t n_upper = lu->u_start[0];
-    for (int32_t e = 0; e < n_upper; ++e) {
-        x[lu->u_row[e]] -= lu->u_value[e] * x[lu->u_column[e]];
-    }
+    eliminate(x, small ? lu->u_row : lu->upper_row, small ? lu->u_column : lu->upper_column,
+              small ? lu->u_value : lu->upper_value, lu->u_start[0]);
     for (int32_t k = 0; k < n; ++k) {
         solution[lu->column_of[k]] = x[k];
         x[k] = 0.0;

@@ -6,11 +6,12 @@
  * the rounding errors do not depend on the scaling of rows, so none is done. Columns are eliminated one
  * after the other, each by those before it ("left-looking").
  *
- * A triangular solve is one long chain of dependent operations. Where n is small and the factors serve many
- * solves (a step needs little more than one, a Jacobian holds for a hundred steps), the inverse is worked
- * out once and applied as a dense product, several times as fast. Its error is of the size of that of the
- * triangular solves (N. J. Higham, Accuracy and Stability of Numerical Algorithms, SIAM 2002, ch. 14), and it
- * serves Newton corrections only.
+ * A triangular solve by columns is one long chain of dependent operations. Where n is small and the factors
+ * serve many solves (a step needs little more than one, a Jacobian holds for dozens of steps), the inverse is
+ * worked out once and applied as a dense product, several times as fast. Its error is of the size of that of
+ * the triangular solves (N. J. Higham, Accuracy and Stability of Numerical Algorithms, SIAM 2002, ch. 14), and
+ * it serves Newton corrections only. Where n is larger, the entries are used level by level: those of a level
+ * do not depend on each other, so that the processor can work on several turbines at a time.
  * Source: T. A. Davis, E. Palamadai Natarajan, Algorithm 907: KLU, ACM TOMS 37 (2010). */
 #ifndef GUSTFORM_LU_H
 #define GUSTFORM_LU_H
@@ -44,6 +45,16 @@ typedef struct gust_lu {
     int32_t *u_row;
     int32_t *u_column;
     double *u_value;
+    /* larger systems: the entries of L and U again, in an order in which neighbours do not wait for each other
+     */
+    int32_t *lower_source; /* where in l_value; NULL if the system is small */
+    int32_t *lower_row;
+    int32_t *lower_column;
+    double *lower_value;
+    int32_t *upper_source;
+    int32_t *upper_row;
+    int32_t *upper_column;
+    double *upper_value;
     double *pivot;          /* [n] D */
     double *pivot_inverse;  /* [n] */
     double *row_scale;      /* [n] 1 / largest entry of the row when the pivots were chosen */

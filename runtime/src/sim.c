@@ -199,6 +199,7 @@ static gust_status prepare(gust_sim *sim, double t0)
                   type->instance_name[bad->instance], type->parameter_name[bad->parameter]);
         return GUST_BAD_PERIOD;
     }
+    sim->next_event = gust_next_event(sim);
     const size_t bytes = (size_t)model->n_unknowns * sizeof(double);
     double *y = gust_vector_data(sim->solver.y);
     double *yp = gust_vector_data(sim->solver.yp);

@@ -33,11 +33,15 @@ struct gust_sim {
     gust_sink sink;
     bool pending;        /* the integrator stands at an event that has not been handled */
     bool root_found;     /* and it is a zero crossing */
+    double next_event;   /* known time at which something will happen, s */
     double reached;      /* time that advance() has reached, s; the integrator may be a step ahead */
     _Atomic double time; /* the same, for other threads */
     atomic_int stop;     /* set by gust_sim_request_stop */
     char message[4096];
 };
+
+/* The next time at which a sample, a scheduled change or a step of a series is due, s. */
+double gust_next_event(const gust_sim *sim);
 
 /* The loop of gust_sim_advance, without hand-over of the last block. */
 gust_status gust_integrate(gust_sim *sim, double until);
