@@ -44,7 +44,7 @@ def literal(value: float) -> str:
     if text in ("inf", "-inf", "nan"):
         return {"inf": "INFINITY", "-inf": "(-INFINITY)", "nan": "NAN"}[text]
     text = text if any(c in text for c in ".en") else text + ".0"
-    return f"({text})" if value < 0 else text
+    return f"({text})" if text.startswith("-") else text
 
 
 def _c_expression(op: int, a: Sequence[str]) -> str:

@@ -66,9 +66,10 @@ values = st.floats(0.5, 4.0)
 
 
 @st.composite
-def networks(draw: st.DrawFn) -> Network:
+def networks(draw: st.DrawFn, alone: bool = False) -> Network:
     """A tree of resistors from ground to every node, so that all is determined; at each node at most one element
-    that holds a voltage (capacitor or source, to ground); further resistors, inductors and current sources anywhere."""
+    that holds a voltage (capacitor or source, to ground); further resistors, inductors and current sources anywhere.
+    `alone`: without terminals."""
     nodes = draw(st.integers(2, 5))
     branches = [Branch("R", draw(st.integers(0, k - 1)), k, draw(values)) for k in range(1, nodes)]
     for node in range(1, nodes):
@@ -79,7 +80,7 @@ def networks(draw: st.DrawFn) -> Network:
         a, b = draw(st.tuples(st.integers(0, nodes - 1), st.integers(0, nodes - 1)).filter(lambda e: e[0] != e[1]))
         branches.append(Branch(kind, a, b, draw(values)))
     free = [n for n in range(1, nodes) if not any(b.kind in "CV" and b.a == n for b in branches)]
-    terminals = draw(st.lists(st.sampled_from(free), max_size=2, unique=True)) if free else []
+    terminals = draw(st.lists(st.sampled_from(free), max_size=2, unique=True)) if free and not alone else []
     return Network(nodes, tuple(draw(st.permutations(branches))), tuple(terminals))
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -270,6 +270,9 @@ def test_stricter_warnings_still(tmp_path: Path) -> None:
     assert run.returncode == 0, run.stderr
 
 
+@example(-0.0)
+@example(5e-324)
+@example(-1.7976931348623157e308)
 @given(st.floats(allow_nan=False))
 def test_literals_read_back_to_the_same_bits(value: float) -> None:
     text = literal(value)
