@@ -4,6 +4,7 @@ import ctypes
 from ctypes import POINTER, c_char_p, c_double, c_float, c_int, c_int32, c_int64, c_size_t, c_void_p
 from functools import cache
 
+from gustform_runtime.errors import Status
 from gustform_runtime.locate import library_path
 
 SERIES_READER = ctypes.CFUNCTYPE(c_int, c_void_p, c_int64, c_int64, POINTER(c_double), POINTER(c_double))
@@ -79,6 +80,17 @@ _SIGNATURES: dict[str, tuple[type | None, tuple[type, ...]]] = {
 }
 
 
+def _check_statuses(loaded: ctypes.CDLL) -> None:
+    """The library must know the same statuses as this package: a stale one would be misread."""
+    known = {status.name: int(status) for status in Status}
+    there = {"OK": 0}
+    while number := loaded.gust_status_list(len(there)):
+        there[loaded.gust_status_name(number).decode()] = number
+    if there != known:
+        odd = ", ".join(sorted(name for name, _ in there.items() ^ known.items()))
+        raise ImportError(f"{library_path()} is of another version than this package ({odd}): build it again")
+
+
 @cache
 def library() -> ctypes.CDLL:
     """libgustform.so, loaded once; calls release the GIL."""
@@ -87,4 +99,5 @@ def library() -> ctypes.CDLL:
         function = getattr(loaded, name)
         function.restype = result
         function.argtypes = arguments
+    _check_statuses(loaded)
     return loaded
