@@ -45,6 +45,7 @@ _STYLE: Any = {
     "legend.frameon": False,
     "legend.fontsize": 8.5,
     "figure.constrained_layout.use": True,
+    "agg.path.chunksize": 500,  # keeps the rasteriser's memory small on noisy lines
 }
 
 
