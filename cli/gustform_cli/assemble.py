@@ -296,27 +296,35 @@ class _Assembly:
                     " or ".join(other for other in self.components if self._unit(other).wind is not None),
                 )
                 continue
+            instances = self.result.instances(name)
             try:
-                shared = self._shared_source(name, block)
-                for number, instance in enumerate(self.result.instances(name), start=1):
-                    if isinstance(block, TurbulentWindBlock):
-                        source = turbulence(block, instance, number, self._radius(block, name))
-                    else:
-                        assert shared is not None
-                        source = shared
+                for instance, source in zip(instances, self._sources(name, block, instances), strict=True):
                     self.result.system.bind(f"{instance}.{wind}", source.drive)
                     if source.reader is not None and isinstance(source.drive, Series):
                         self.result.readers[source.drive.name] = source.reader
             except GustformError as error:
                 self._keep(error, path)
 
-    def _shared_source(self, name: str, block: ConstantWind | TurbulentWindBlock | FileWind) -> WindSource | None:
-        """The source that all instances of a component share; turbulence is made for each."""
+    def _sources(
+        self, name: str, block: ConstantWind | TurbulentWindBlock | FileWind, instances: list[str]
+    ) -> list[WindSource]:
+        """A source for each instance: turbulence of its own, or the one wind for all."""
+        if isinstance(block, TurbulentWindBlock):
+            radius = self._radius(block, name)
+            return [turbulence(block, instance, number, radius) for number, instance in enumerate(instances, start=1)]
         if isinstance(block, ConstantWind):
-            return constant(block)
-        if isinstance(block, FileWind):
-            return csv_file(block, name, Path(self.document.file).parent, self.scenario.run.until)
-        return None
+            return [constant(block)] * len(instances)
+        operating = self._unit(name).wind_speed
+        if operating is not None and operating not in (self.scenario.components[name].model_extra or {}):
+            raise GustformError(
+                "GF2202",
+                f"components.{name}.{operating} must be given, because the wind comes from a file; it is missing",
+                hint=f"{operating}: 8 m/s, the wind that the operating point is made for",
+                place=self.document.place(("components", name)),
+            )
+        start = float(self.components[name].value(operating)) if operating is not None else None
+        folder = Path(self.document.file).parent
+        return [csv_file(block, name, folder, self.scenario.run.until, start)] * len(instances)
 
     def _radius(self, block: TurbulentWindBlock, name: str) -> float:
         """Rotor radius for the averaging, m."""

@@ -42,7 +42,8 @@ _STYLE: Any = {
     "grid.color": "#e3e3e3",
     "grid.linewidth": 0.7,
     "lines.linewidth": 1.5,
-    "legend.frameon": False,
+    "legend.framealpha": 0.8,  # long runs fill their panels
+    "legend.edgecolor": "none",
     "legend.fontsize": 8.5,
     "figure.constrained_layout.use": True,
     "agg.path.chunksize": 500,  # keeps the rasteriser's memory small on noisy lines
@@ -128,7 +129,7 @@ def _draw_panels(panels: Filled, run: RunData, figure: Path) -> None:
         for axis in axes[len(panels) :]:
             axis.set_axis_off()
         for axis in axes[max(0, len(panels) - 2) : len(panels)]:
-            axis.set_xlabel("time (s)")
+            _name_time(axis, run.time[-1] - run.time[0])
             axis.tick_params(labelbottom=True)
         canvas.align_ylabels()
         canvas.suptitle(_heading(run), x=0.012, ha="left", fontsize=12, fontweight="bold")
@@ -208,6 +209,20 @@ def _draw_panel(
         axis.legend(loc="best")
 
 
+def _name_time(axis: Axes, span: float) -> None:
+    """Seconds, or hours where the run is long; `span` in s."""
+    from matplotlib.ticker import FuncFormatter, MultipleLocator
+
+    if span < 2.5 * 3600.0:
+        axis.set_xlabel("time (s)")
+        return
+    hours = span / 3600.0
+    every = next((h for h in (0.5, 1, 2, 3, 6, 12, 24, 48, 120, 240, 480, 720) if hours / h <= 9), hours / 8)
+    axis.xaxis.set_major_locator(MultipleLocator(3600.0 * every))
+    axis.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value / 3600.0:g}"))
+    axis.set_xlabel("time (h)")
+
+
 def _keep_height(axis: Axes, least: float) -> None:
     low, high = axis.get_ylim()
     if high - low < least:
@@ -238,14 +253,14 @@ def _mark_frequency(axis: Axes, run: RunData) -> None:
         return
     values = run.curve(name).values
     begin = min((event["at"] for event in run.json("events") or ()), default=run.time[0])
-    after = np.flatnonzero(run.time >= begin)
-    if after.size == 0 or np.ptp(values[after]) < 1e-3:
+    figures = (run.json("statistics") or {}).get("frequency") or {}
+    nadir, at = figures.get("nadir_hz"), figures.get("nadir_time_s")
+    if nadir is None or at is None or np.ptp(values[run.time >= begin]) < 1e-3:
         return
-    lowest = after[int(np.argmin(values[after]))]
     low, high = axis.get_ylim()
     axis.set_ylim(low - 0.1 * (high - low), high)  # room for the text below the curve
-    _point_out(axis, run.time[lowest], values[lowest], f"nadir {values[lowest]:.3f} Hz at {run.time[lowest]:.1f} s")
-    settled = ((run.json("statistics") or {}).get("frequency") or {}).get("settle_hz")
+    _point_out(axis, at, nadir, f"nadir {nadir:.3f} Hz at {at:.1f} s")
+    settled = figures.get("settle_hz")
     if settled is not None and run.attribute("status") == "completed" and _still(run, _WIND):
         time = min(begin + SETTLE_AFTER, run.time[-1])
         _point_out(axis, time, settled, f"{settled:.3f} Hz at {time:.0f} s")

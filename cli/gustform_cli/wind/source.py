@@ -46,8 +46,9 @@ def turbulence(block: TurbulentWindBlock, name: str, number: int, radius: float)
     return WindSource(Series(name=f"wind of {name}", operating_value=block.mean, dt=block.every), reader)
 
 
-def csv_file(block: FileWind, name: str, folder: Path, until: float) -> WindSource:
-    """Wind from a file, which is checked here: GF2501 ... GF2506, GF2303 for a unit of its columns."""
+def csv_file(block: FileWind, name: str, folder: Path, until: float, start: float | None) -> WindSource:
+    """Wind from a file, which is checked here: GF2501 ... GF2506, GF2303 for a unit of its columns. `start` is the
+    wind of the steady state that the run starts from, m/s; None takes the first of the file."""
     factors = []
     for role, declared in (("time", "s"), ("speed", "m/s")):
         unit = getattr(block.units, role)
@@ -63,10 +64,9 @@ def csv_file(block: FileWind, name: str, folder: Path, until: float) -> WindSour
     columns = CsvColumns(folder / block.path, block.columns.time, block.columns.speed, *factors)
     last = scan(columns, until, hold=block.on_end == "hold")
     reader = CsvWind(columns)
-    _, speeds = reader(0, 1)
     drive = Series(
         name=f"wind of {name}",
-        operating_value=float(speeds[0]),
+        operating_value=start if start is not None else float(reader(0, 1)[1][0]),
         time=np.empty(0),  # the samples carry their times; they come from the reader
         on_end=block.on_end,
         t_end=last,

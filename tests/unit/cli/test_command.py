@@ -140,7 +140,9 @@ def test_a_wind_file_drives_the_run(tmp_path: Path) -> None:
     (tmp_path / "wind.csv").write_text("time,speed\n" + "".join(f"{t},{8 + 0.5 * (t % 3)}\n" for t in range(12)))
     scenario = tmp_path / "s.yaml"
     scenario.write_text(
-        LOAD_STEP.read_text().replace("wt: {type: constant, speed: 8 m/s}", "wt: {type: file, path: wind.csv}")
+        LOAD_STEP.read_text()
+        .replace("wt: {type: constant, speed: 8 m/s}", "wt: {type: file, path: wind.csv}")
+        .replace("aggregate: 10", "aggregate: 10\n    wind_speed: 8 m/s")
     )
     process = inside("simulate", scenario, "--out", tmp_path / "out", "--no-figure", "--set", "run.until=11 s")
     assert process.exit_code == 0, process.stderr
