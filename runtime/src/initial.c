@@ -58,8 +58,7 @@ static gust_status not_finite(const gust_initial *initial, double t, int32_t row
     gust_model_equation_name(initial->system->model, row, name, sizeof name);
     gust_text(message, size,
               "at t = %.9g s the equation %s gives %g: look for a division by zero or a root of a negative "
-              "number, and at "
-              "the start values it uses",
+              "number, and at the start values it uses",
               t, name, initial->residual[row]);
     return GUST_NOT_FINITE;
 }
@@ -146,8 +145,7 @@ static gust_status not_consistent(gust_initial *initial, double t, const double 
     const gust_model *model = initial->system->model;
     gust_text(message, size,
               "at t = %.9g s no consistent values were found in %d iterations: try start values nearer to the "
-              "solution, or a "
-              "larger initial_iterations",
+              "solution, or a larger initial_iterations",
               t, iterations);
     if (gust_system_residual(initial->system, t, y, yp, initial->residual)) {
         gust_diagnose_rows(model, initial->residual, initial->values, message, size);
@@ -161,6 +159,8 @@ static gust_status not_consistent(gust_initial *initial, double t, const double 
     return GUST_NOT_CONSISTENT;
 }
 
+enum { MAX_HALVINGS = 17 }; /* a step of 1e-5 of Newton's gets nowhere */
+
 typedef enum damped { DAMPED_ACCEPTED, DAMPED_CONVERGED, DAMPED_REJECTED, DAMPED_SERIES } damped;
 
 /* One damped Newton step from y, yp along initial->correction of size `norm`. */
@@ -168,7 +168,8 @@ static damped damped_step(gust_initial *initial, double t, double *y, double *yp
 {
     gust_system *system = initial->system;
     const double tolerance = initial->options->initial_tolerance;
-    for (double factor = 1.0; factor > 1e-5; factor *= 0.5) {
+    double factor = 1.0;
+    for (int halvings = 0; halvings < MAX_HALVINGS; ++halvings, factor *= 0.5) {
         try_step(initial, y, yp, initial->correction, factor);
         if (!gust_system_residual(system, t, initial->trial_y, initial->trial_yp, initial->residual)) {
             return DAMPED_SERIES;

@@ -94,8 +94,8 @@ static gust_status end_of_data(gust_sim *sim)
 {
     const gust_series_set *set = &sim->system.series;
     gust_text(sim->message, sizeof sim->message,
-              "series \"%s\" ends at %.9g s: the simulation stops there; extend it, or give it on_end: hold or "
-              "repeat",
+              "series \"%s\" ends at %.9g s: the simulation stops there; extend it, or give it on_end: hold "
+              "or repeat",
               set->series[set->ending].what->name, set->end);
     return GUST_END_OF_DATA;
 }

@@ -41,8 +41,7 @@ const gust_kernel *gust_kernel_open(const char *path, void **library, char *mess
     } else if (kernel->abi != GUST_KERNEL_ABI) {
         gust_text(message, size,
                   "kernel library \"%s\" was made for kernel interface %u, this runtime has %d: empty the "
-                  "kernel cache and "
-                  "build the model again",
+                  "kernel cache and build the model again",
                   path, kernel->abi, GUST_KERNEL_ABI);
         kernel = NULL;
     } else if (!complete(kernel)) {

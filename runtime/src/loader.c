@@ -18,7 +18,7 @@
 #include "model.h"
 #include "text.h"
 
-enum { N_COUNTS = 8, N_TEXT_TABLES_OF_TYPE = 8, N_TEXT_TABLES_OF_MODEL = 2 };
+enum { N_COUNTS = 8, N_TEXT_TABLES_OF_TYPE = 8, N_TEXT_TABLES_OF_MODEL = 2, MAX_GRID_LINES = 1000000 };
 
 typedef struct loader {
     gust_model *model;
@@ -40,8 +40,10 @@ __attribute__((format(printf, 3, 4))) static bool refuse(loader *load, gust_stat
         va_end(arguments);
     }
     load->status = status;
-    return false;
 }
+
+/* Keeps status and message; false, so that a function can return it. */
+#define refuse(...) (note_refusal(__VA_ARGS__), false)
 
 static bool no_memory(loader *load)
 {
@@ -321,7 +323,7 @@ static bool read_table(loader *load, int32_t number)
     snprintf(load->prefix, sizeof load->prefix, "table.%d.", number);
     const double *grid = NULL;
     const int32_t *size = NULL;
-    if (!finite_doubles(load, "grid", 4, &grid) || !indices(load, "size", 2, 2, 1 << 24, &size)) {
+    if (!finite_doubles(load, "grid", 4, &grid) || !indices(load, "size", 2, 2, MAX_GRID_LINES, &size)) {
         return false;
     }
     if (!(grid[1] > 0.0) || !(grid[3] > 0.0)) {
@@ -330,7 +332,7 @@ static bool read_table(loader *load, int32_t number)
                       grid[3]);
     }
     const double *coefficient = NULL;
-    if (!finite_doubles(load, "coefficient", (int64_t)(size[0] + 2) * (size[1] + 2), &coefficient)) {
+    if (!finite_doubles(load, "coefficient", ((int64_t)size[0] + 2) * ((int64_t)size[1] + 2), &coefficient)) {
         return false;
     }
     *table = (gust_table){.x_start = grid[0],
@@ -483,11 +485,10 @@ static bool check_positions(loader *load, const gust_model_type *type)
                                        : external[local_column - kernel->n_unknowns];
             if (position[k] < model->column_start[column] || position[k] >= model->column_start[column + 1] ||
                 model->row_index[position[k]] != row) {
-                return refuse(
-                    load, GUST_BAD_TABLE,
-                    "instance \"%s\": entry %d of its Jacobian belongs in row %d, column %d, but \"jacobian_"
-                    "position\" says %d: build the model again",
-                    type->instance_name[i], k, row, column, position[k]);
+                return refuse(load, GUST_BAD_TABLE,
+                              "instance \"%s\": entry %d of its Jacobian belongs in row %d, column %d, but "
+                              "\"jacobian_position\" says %d: build the model again",
+                              type->instance_name[i], k, row, column, position[k]);
             }
         }
     }

@@ -86,6 +86,8 @@ static void take_sources(gust_lu *lu, const int32_t *column_start, const int32_t
     }
 }
 
+enum { FIRST_ROOM = 1024 };
+
 /* Lists that grow while the pattern of the factors is being found. */
 typedef struct growing {
     int32_t *entry;
@@ -96,14 +98,12 @@ typedef struct growing {
 static bool append(growing *list, int32_t entry)
 {
     if (list->used == list->room) {
-        const int32_t room = list->room < 512 ? 1024 : list->room + list->room / 2;
+        const int32_t room = list->room + list->room / 2;
         int32_t *larger = room > list->room ? integers((size_t)room) : NULL;
         if (larger == NULL) {
             return false;
         }
-        if (list->used > 0) {
-            memcpy(larger, list->entry, (size_t)list->used * sizeof *larger);
-        }
+        memcpy(larger, list->entry, (size_t)list->used * sizeof *larger);
         gust_release(list->entry);
         list->entry = larger;
         list->room = room;
@@ -207,11 +207,12 @@ static void arrange(gust_lu *lu, const growing *lower, const growing *upper, con
 static bool find_pattern(gust_lu *lu)
 {
     const int32_t n = lu->n;
-    growing lower = {0};
-    growing upper = {0};
+    growing lower = {.entry = integers(FIRST_ROOM), .room = FIRST_ROOM};
+    growing upper = {.entry = integers(FIRST_ROOM), .room = FIRST_ROOM};
     column_search search = {.mark = integers((size_t)n), .heap = integers((size_t)n)};
     int32_t *upper_start = integers((size_t)n + 1);
-    bool good = search.mark != NULL && search.heap != NULL && upper_start != NULL;
+    bool good = lower.entry != NULL && upper.entry != NULL && search.mark != NULL && search.heap != NULL &&
+                upper_start != NULL;
     for (int32_t k = 0; k < n && good; ++k) {
         lu->l_start[k] = lower.used;
         upper_start[k] = upper.used;
@@ -464,12 +465,12 @@ __attribute__((always_inline)) static inline void multiply(const gust_lu *lu, co
         odd[v] = (lanes){0.0};
     }
     int32_t k = 0;
-    for (; k + 1 < lu->n; k += 2, column += 2 * n_lanes) {
+    for (; k + 1 < lu->n; k += 2, column += 2 * (int64_t)n_lanes) {
         const double first = right[lu->row_of[k]];
         const double second = right[lu->row_of[k + 1]];
         for (int v = 0; v < n_lanes; ++v) {
             even[v] += column[v] * first;
-            odd[v] += column[n_lanes + v] * second;
+            odd[v] += column[(int64_t)n_lanes + v] * second;
         }
     }
     if (k < lu->n) {

@@ -100,20 +100,19 @@ static double sample_time(const gust_series *series, int64_t in_window)
 static bool check_window(gust_series_set *set, const gust_series *series)
 {
     for (int64_t i = 0; i < series->count; ++i) {
+        const long long number = series->first + i;
         const bool finite = isfinite(series->value[i]) && (series->what->uniform || isfinite(series->time[i]));
         if (!finite) {
             gust_text(set->message, sizeof set->message,
                       "series \"%s\": sample %lld (t = %g s, value %g) is not a number: clean the data first",
-                      series->what->name, (long long)(series->first + i), sample_time(series, i),
-                      series->value[i]);
+                      series->what->name, number, sample_time(series, i), series->value[i]);
             return fail(set, GUST_BAD_SERIES);
         }
         if (!series->what->uniform && i > 0 && !(series->time[i] > series->time[i - 1])) {
             gust_text(set->message, sizeof set->message,
                       "series \"%s\": the time of sample %lld (%g s) is not after that of the one before (%g "
-                      "s): sort the "
-                      "data first",
-                      series->what->name, (long long)(series->first + i), series->time[i], series->time[i - 1]);
+                      "s): sort the data first",
+                      series->what->name, number, series->time[i], series->time[i - 1]);
             return fail(set, GUST_BAD_SERIES);
         }
     }
@@ -367,10 +366,9 @@ static bool measure_file(gust_series_set *set, gust_series *series)
         return fail(set, GUST_BAD_SERIES);
     }
     double last = series->what->t0 + (double)(series->n_total - 1) * series->what->dt;
-    if (!series->what->uniform) {
-        if (read_bytes(series, (series->n_total - 1) * width, &last, sizeof last) != (ssize_t)sizeof last) {
-            return unreadable(set, series);
-        }
+    if (!series->what->uniform &&
+        read_bytes(series, (series->n_total - 1) * width, &last, sizeof last) != (ssize_t)sizeof last) {
+        return unreadable(set, series);
     }
     series->end = last_time(series, last);
     return true;
@@ -413,9 +411,8 @@ gust_status gust_series_open(gust_series_set *set, int64_t block, double t, doub
         const double first = series->what->uniform ? series->what->t0 : series->time[0];
         if (gust_moment_end(t) < first) {
             gust_text(set->message, sizeof set->message,
-                      "series \"%s\" begins at %g s, after the start of the simulation at %g s: start later or "
-                      "extend the "
-                      "series",
+                      "series \"%s\" begins at %g s, after the start of the simulation at %g s: start later "
+                      "or extend the series",
                       series->what->name, first, t);
             set->failure = GUST_SERIES_NOT_COVERING;
             return set->failure;

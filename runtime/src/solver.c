@@ -305,8 +305,7 @@ static gust_status explain_error_test(gust_solver *solver, char *message, size_t
     double *weights = gust_vector_data(solver->dense_yp);
     gust_text(message, size,
               "at t = %.9g s the step became too small to meet the tolerance (rtol %g): an unknown jumps or "
-              "grows without "
-              "bound there; try a larger rtol, or look at what happens at that time",
+              "grows without bound there; try a larger rtol, or look at what happens at that time",
               solver->t, solver->options->rtol);
     if (IDAGetEstLocalErrors(solver->ida, solver->dense_y) == IDA_SUCCESS &&
         IDAGetErrWeights(solver->ida, solver->dense_yp) == IDA_SUCCESS) {
@@ -347,8 +346,8 @@ static gust_status explain_convergence(gust_solver *solver, char *message, size_
         return GUST_SINGULAR_STEP;
     }
     gust_text(message, size,
-              "at t = %.9g s the equations could not be solved, not even for a very small step; try a "
-              "smaller max_step, or look at what happens at that time",
+              "at t = %.9g s the equations could not be solved, not even for a very small step; try a smaller "
+              "max_step, or look at what happens at that time",
               solver->t);
     double *left = gust_vector_data(solver->dense_y);
     if (solver->last_y != NULL && gust_system_residual(system, solver->last_t, gust_vector_data(solver->last_y),

@@ -100,7 +100,7 @@ static void linear_sum(sunrealtype a, N_Vector x, sunrealtype b, N_Vector y, N_V
     const double *xd = data_of(x);
     const double *yd = data_of(y);
     double *zd = data_of(z);
-#pragma GCC ivdep
+    GUST_INDEPENDENT
     for (int64_t i = 0; i < n; ++i) {
         zd[i] = a * xd[i] + b * yd[i];
     }
@@ -121,7 +121,7 @@ static void product(N_Vector x, N_Vector y, N_Vector z)
     const double *xd = data_of(x);
     const double *yd = data_of(y);
     double *zd = data_of(z);
-#pragma GCC ivdep
+    GUST_INDEPENDENT
     for (int64_t i = 0; i < n; ++i) {
         zd[i] = xd[i] * yd[i];
     }
@@ -133,7 +133,7 @@ static void divide(N_Vector x, N_Vector y, N_Vector z)
     const double *xd = data_of(x);
     const double *yd = data_of(y);
     double *zd = data_of(z);
-#pragma GCC ivdep
+    GUST_INDEPENDENT
     for (int64_t i = 0; i < n; ++i) {
         zd[i] = xd[i] / yd[i];
     }
@@ -150,7 +150,7 @@ static void scale(sunrealtype c, N_Vector x, N_Vector z)
         }
         return;
     }
-#pragma GCC ivdep
+    GUST_INDEPENDENT
     for (int64_t i = 0; i < n; ++i) {
         zd[i] = c * xd[i];
     }
@@ -161,7 +161,7 @@ static void absolute(N_Vector x, N_Vector z)
     const int64_t n = content(x)->padded;
     const double *xd = data_of(x);
     double *zd = data_of(z);
-#pragma GCC ivdep
+    GUST_INDEPENDENT
     for (int64_t i = 0; i < n; ++i) {
         zd[i] = fabs(xd[i]);
     }
@@ -172,7 +172,7 @@ static void inverse(N_Vector x, N_Vector z)
     const int64_t n = content(x)->length;
     const double *xd = data_of(x);
     double *zd = data_of(z);
-#pragma GCC ivdep
+    GUST_INDEPENDENT
     for (int64_t i = 0; i < n; ++i) {
         zd[i] = 1.0 / xd[i];
     }
@@ -183,7 +183,7 @@ static void add_constant(N_Vector x, sunrealtype b, N_Vector z)
     const int64_t n = content(x)->length;
     const double *xd = data_of(x);
     double *zd = data_of(z);
-#pragma GCC ivdep
+    GUST_INDEPENDENT
     for (int64_t i = 0; i < n; ++i) {
         zd[i] = xd[i] + b;
     }
@@ -356,7 +356,7 @@ static double minimum_quotient(N_Vector numerator, N_Vector denominator)
 /* One loop for each number of vectors, so that everything stays in registers. Reading all inputs of an
  * element before writing it makes z = X[k] harmless. */
 #define COMBINE(EXPRESSION)                                                                                    \
-    _Pragma("GCC ivdep") for (int64_t i = 0; i < n; ++i)                                                       \
+    GUST_INDEPENDENT for (int64_t i = 0; i < n; ++i)                                                           \
     {                                                                                                          \
         zd[i] = EXPRESSION;                                                                                    \
     }

@@ -12,6 +12,15 @@
 
 enum { GUST_VECTOR_BLOCK = 8 };
 
+/* Before a loop whose passes do not depend on each other, even where its arrays are one and the same. */
+#if defined(__clang__)
+#define GUST_INDEPENDENT _Pragma("clang loop vectorize(assume_safety)")
+#elif defined(__GNUC__)
+#define GUST_INDEPENDENT _Pragma("GCC ivdep")
+#else
+#define GUST_INDEPENDENT
+#endif
+
 typedef struct gust_vector {
     int64_t length;
     int64_t padded; /* length rounded up; data[length .. padded - 1] is 0 */

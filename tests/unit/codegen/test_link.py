@@ -479,6 +479,32 @@ def test_two_ideal_sources_on_one_bus(cache: KernelCache) -> None:
         assert innocent not in text.partition(" — try ")[0]
 
 
+class Pole(Component):
+    """A capacitor straight at its terminal: the terminal's potential is its state."""
+
+    C = Parameter("F", "capacitance", default=1.0)
+    v = Variable("V", "voltage")
+    pin = DcPort("terminal")
+
+    def equations(self) -> None:
+        self.eq(self.v, self.pin.v)
+        self.eq(self.C * self.der(self.v), self.pin.i)
+
+
+def test_two_states_that_the_connection_makes_equal(cache: KernelCache) -> None:
+    s = System()
+    s.add("one", Pole())
+    s.add("load", Load())
+    s.connect("one.pin", "load.pin")
+    assert build(s, cache).linked.table.differential.sum() == 1  # alone it is a state like any other
+    s.add("two", Pole(C=2.0))
+    s.connect("one.pin", "two.pin")
+    text = refused("GF3020", s, cache)
+    assert "one: v = pin.v" in text
+    assert "two: v = pin.v" in text
+    assert "load: " not in text
+
+
 class Watched(Component):
     """Draws a current that depends on another bus only: nothing ties its own voltage down."""
 
