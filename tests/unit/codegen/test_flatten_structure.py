@@ -553,8 +553,7 @@ def test_equations_that_say_the_same_twice() -> None:
     assert "b = a" in text
 
 
-@pytest.mark.parametrize("via", ["directly", "by an equation"])
-def test_the_derivative_of_what_is_given_from_outside(via: str) -> None:
+def test_the_derivative_of_what_is_given_from_outside() -> None:
     class Outside(Component):
         C = Parameter("F", "capacitance", default=1.0)
         pin = DcPort("terminal")

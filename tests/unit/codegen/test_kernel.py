@@ -298,7 +298,13 @@ def test_a_function_without_a_c_form_is_refused() -> None:
 # ---- the text ----
 
 PRINT = """
+import hashlib
 import sys
+from pathlib import Path
+from gustform_codegen.build import build
+from gustform_codegen.cache import KernelCache
+from tests.unit.codegen.compiled import INCLUDE
+from tests.unit.codegen.test_link import network
 from tests.unit.codegen.circuits import Follower, Ladder, Storage
 from tests.unit.codegen.everything import everything
 from gustform_codegen.emit.kernel import emit_kernel
@@ -306,16 +312,24 @@ from gustform_codegen.flatten import flatten
 parts = [emit_kernel(flatten(everything(), frozenset({"w"}), frozenset({"shown"}))).text]
 parts += [emit_kernel(flatten(c)).text for c in (Storage(), Ladder())]
 parts += [emit_kernel(flatten(Follower(), frozenset({"u"}))).text]
+linked = build(network(2), KernelCache(INCLUDE, Path(sys.argv[1]))).linked
+table = linked.table.with_channels(linked.select(["*"])[0])
+parts.append(hashlib.sha256(table.to_bytes()).hexdigest())
 sys.stdout.write("".join(parts))
 """
 
 
-def test_the_text_is_the_same_in_every_process() -> None:
+def test_text_and_table_are_the_same_in_every_process(cache_folder: Path) -> None:
     texts = []
     for seed in ("1", "2"):
         environment = {**os.environ, "PYTHONHASHSEED": seed, "PYTHONPATH": os.pathsep.join(sys.path)}
         run = subprocess.run(
-            [sys.executable, "-c", PRINT], capture_output=True, text=True, check=True, cwd=ROOT, env=environment
+            [sys.executable, "-c", PRINT, str(cache_folder)],
+            capture_output=True,
+            text=True,
+            check=True,
+            cwd=ROOT,
+            env=environment,
         )
         texts.append(run.stdout)
     assert len(texts[0]) > 10000
