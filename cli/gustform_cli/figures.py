@@ -45,6 +45,8 @@ _STYLE: Any = {
     "legend.framealpha": 0.8,  # long runs fill their panels
     "legend.edgecolor": "none",
     "legend.fontsize": 8.5,
+    # With it a level line of many points jumps by a pixel where the renderer begins its next piece.
+    "path.snap": False,
     "figure.constrained_layout.use": True,
     "agg.path.chunksize": 500,  # keeps the rasteriser's memory small on noisy lines
 }

@@ -150,28 +150,6 @@ def test_a_wind_file_drives_the_run(tmp_path: Path) -> None:
         assert data["wt.wind"].sel(time=7.5, method="nearest").item() == pytest.approx(8.75, abs=0.02)
 
 
-def peak_memory(out: Path, until: str) -> int:
-    """Peak resident memory of a run in a process of its own, kB."""
-    script = (
-        "import resource, sys\n"
-        "from gustform_cli.main import main\n"
-        f"sys.argv = ['gustform', 'simulate', {str(TURBULENT)!r}, '--out', {str(out)!r}, '--no-figure', '--set', "
-        f"'run.until={until}']\n"
-        "try:\n    main()\n"
-        "except SystemExit as end:\n    assert not end.code\n"
-        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)\n"
-    )
-    process = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, env=environment(), check=True, timeout=120
-    )
-    return int(process.stdout.splitlines()[-1])
-
-
-def test_memory_does_not_grow_with_the_run(tmp_path: Path) -> None:
-    # 4 h write 24 times as much as 10 min; a whole day is in the benchmarks. 10 % is what the issue allows for it.
-    assert peak_memory(tmp_path, "4 h") < 1.1 * peak_memory(tmp_path, "10 min")
-
-
 # ---- stopping -------------------------------------------------------------------------------------------------------
 def start_long_run(out: Path) -> subprocess.Popen[str]:
     process = subprocess.Popen(
