@@ -30,8 +30,8 @@ typedef struct loader {
     char prefix[32]; /* "type.3." while that type is read */
 } loader;
 
-__attribute__((format(printf, 3, 4))) static bool refuse(loader *load, gust_status status, const char *format,
-                                                         ...)
+__attribute__((format(printf, 3, 4))) static void note_refusal(loader *load, gust_status status,
+                                                               const char *format, ...)
 {
     if (load->message != NULL && load->message_size > 0) {
         va_list arguments;

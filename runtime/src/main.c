@@ -40,9 +40,8 @@ static void on_interrupt(int number)
 
 static void print_usage(FILE *to)
 {
-    fputs("usage: gust-run MODEL.gust --until SECONDS [--every SECONDS] [--start SECONDS] [--out FILE.csv] "
-          "[--quiet]\n"
-          "                [--OPTION VALUE ...]\n"
+    fputs("usage: gust-run MODEL.gust --until SECONDS [--every SECONDS] [--start SECONDS] [--out FILE.csv]\n"
+          "                [--quiet] [--OPTION VALUE ...]\n"
           "Runs a built model and writes its channels as CSV, to standard output unless --out names a file.\n"
           "  --until   simulated time at which to stop, s\n"
           "  --every   interval of result rows, s (default: a thousandth of the run)\n"
@@ -54,9 +53,8 @@ static void print_usage(FILE *to)
         const gust_option_info *option = gust_option_list(i);
         fprintf(to, "  --%-22s %s (default %g)\n", option->name, option->sentence, option->initial);
     }
-    fputs(
-        "Exit codes: 0 done, 1 model or run error, 2 usage, 130 interrupted (what was computed is written).\n",
-        to);
+    fputs("Exit codes: 0 done, 1 model or run error, 2 usage, 130 interrupted (rows so far are written).\n",
+          to);
 }
 
 static bool read_number(const char *name, const char *text, double *value)

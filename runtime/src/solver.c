@@ -232,6 +232,25 @@ static gust_status refused(const gust_solver *solver, char *message, size_t size
     return GUST_SOLVER_FAILED;
 }
 
+/* Factors a Jacobian as the first step will have it: what the factors need is allocated here, and a matrix
+ * that is singular for every step is found before the first. */
+static gust_status choose_pivots(gust_solver *solver, double t, double first_step, char *message, size_t size)
+{
+    gust_system *system = solver->system;
+    double *values = gust_matrix_values(solver->matrix);
+    if (!gust_system_jacobian(system, t, gust_vector_data(solver->y), gust_vector_data(solver->yp),
+                              1.0 / first_step, values)) {
+        gust_text(message, size, "%s", system->series.message);
+        return system->series.failure;
+    }
+    if (!gust_factors_set(&solver->factors, values)) {
+        gust_text(message, size, "at t = %.9g s the Jacobian of the first step is singular", t);
+        gust_diagnose_singular(system->model, values, solver->factors.singular_column, message, size);
+        return GUST_SINGULAR;
+    }
+    return GUST_OK;
+}
+
 gust_status gust_solver_start(gust_solver *solver, double t, double first_step, char *message, size_t size)
 {
     const gust_model *model = solver->system->model;
@@ -255,7 +274,7 @@ gust_status gust_solver_start(gust_solver *solver, double t, double first_step, 
     solver->t = t;
     solver->stop = INFINITY;
     solver->stalled_steps = 0;
-    return GUST_OK;
+    return choose_pivots(solver, t, first_step, message, size);
 }
 
 /* Counters of IDA since its last (re)start. */
