@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field
 
+import numpy as np
+
 from gustform_codegen.link import Linked
+
+_ROUNDING = 1e-12  # of the largest value: what solving for a spline's coefficients costs, and no reason to warn
 
 
 @dataclass(frozen=True)
@@ -69,10 +73,11 @@ def model_report(linked: Linked) -> ModelReport:
         for name, component in zip(t.names, t.components, strict=True):
             for reference in t.unit.tables:
                 data = component.at(reference.owner.path).table(reference.declaration.name)
-                if id(data) not in seen and data.resampling_error > 0:
+                if id(data) not in seen and data.resampling_error > _ROUNDING * float(np.max(np.abs(data.value))):
                     seen.add(id(data))
+                    path = ".".join(p for p in (name, reference.owner.path, reference.declaration.name) if p)
                     warnings.append(
-                        f"{name}.{reference.owner.path}: table {data.name} differs from its uniform spline by at most "
+                        f"{path}: table {data.name} differs from its uniform spline by at most "
                         f"{data.resampling_error:.2g} at the given points"
                     )
     table = linked.table

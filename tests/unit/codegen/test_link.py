@@ -423,6 +423,19 @@ def test_the_report_counts(linked: Linked) -> None:
     assert report.as_dict()["unknowns"] == 9
 
 
+def test_the_report_warns_of_tables_that_were_resampled(cache: KernelCache) -> None:
+    even, odd = np.linspace(0.0, 3.0, 7), np.array([0.0, 0.37, 1.0, 1.9, 2.35, 3.0])
+    s = System()
+    s.add("source", IdealSource(V=1.25))
+    s.add("even", Look(cp=TableData(even, even, np.sin(np.add.outer(even, even)), "even.csv")))
+    s.add("odd", Look(cp=TableData(odd, even, np.sin(3 * np.add.outer(odd, even)), "odd.csv")))
+    s.add("odd_too", Look(cp=s.components["odd"].table("cp")))
+    for name in ("even", "odd", "odd_too"):
+        s.connect("source.pin", f"{name}.pin")
+    (warning,) = model_report(build(s, cache).linked).warnings  # one for each table, none for rounding
+    assert warning.startswith("odd.cp: table odd.csv differs from its uniform spline by at most 0.")
+
+
 # ---- refusals ----
 
 
