@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -31,7 +32,9 @@ def _peak(until: str, out: Path) -> int:
         "--out",
         str(out),
     ]
-    run = subprocess.run(command, capture_output=True, text=True, check=True)
+    # The package as these tests see it, installed or not.
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
+    run = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
     return int(run.stdout)
 
 
