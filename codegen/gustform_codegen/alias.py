@@ -8,6 +8,9 @@ from typing import Any
 
 import casadi as ca
 
+# The rank of what is given from outside a unit: two of these are never merged.
+GIVEN = 9
+
 
 @dataclass
 class AliasSets:
@@ -27,7 +30,7 @@ class AliasSets:
     def join(self, a: int, b: int, sign: int) -> bool:
         """Record a = sign * b. False if both stand for themselves and may not be merged, or are one already."""
         (a, sa), (b, sb) = self.find(a), self.find(b)
-        if a == b or (self.rank(a) >= 3 and self.rank(b) >= 3):
+        if a == b or (self.rank(a) == GIVEN and self.rank(b) == GIVEN):
             return False
         if self.rank(a) > self.rank(b):
             a, b = b, a

@@ -18,7 +18,7 @@ from gustform.language.errors import GustformError, Place
 from gustform.language.operators import TableCall, constants, table_calls
 from gustform.language.scope import Elaborated, Symbol, elaborate
 from gustform.language.unitcheck import check_units
-from gustform_codegen.alias import AliasSets, as_alias
+from gustform_codegen.alias import GIVEN, AliasSets, as_alias
 from gustform_codegen.balance import check_balance, refuse_constraint, refuse_singular
 from gustform_codegen.connections import connection_equations
 from gustform_codegen.events import bend_roots, indicator, refuse_bare_comparisons
@@ -96,12 +96,20 @@ class _Flattener:
         def rank(key: int) -> int:
             s = symbols[key]
             if not self.is_unknown(s):
-                return 3
+                return GIVEN
+            if getattr(s.declaration, "fixed", False):
+                return 3  # whoever stands for the set, its start value must be this one's
             if key in ders:
                 return 2
             return 1 if s.kind in ("variable", "output") else 0
 
         sets = AliasSets(rank)
+
+        def joins_state_to_given(a: int, b: int) -> bool:
+            ends = [sets.find(key)[0] for key in (a, b)]
+            states = {sets.find(key)[0] for key in ders}
+            return any(rank(x) == GIVEN and y in states for x, y in (ends, ends[::-1]))
+
         rest: list[_Statement] = []
         for statement in statements:
             pair = as_alias(statement.expression)
@@ -114,15 +122,7 @@ class _Flattener:
                     and symbols[k].path not in self.keep
                     for k in (ka, kb)
                 )
-                external_state = (
-                    any(
-                        rank(x) == 3 and sets.find(y)[0] in ders
-                        for x, y in ((sets.find(ka)[0], kb), (sets.find(kb)[0], ka))
-                    )
-                    if mergeable
-                    else False
-                )
-                if mergeable and not external_state and sets.join(ka, kb, sign):
+                if mergeable and not joins_state_to_given(ka, kb) and sets.join(ka, kb, sign):
                     continue
             rest.append(statement)
         self.alias: dict[int, tuple[int, int]] = {}

@@ -156,6 +156,44 @@ class Inverse(Pole):
         self.eq(self.C * self.der(self.v) + self.pin.i, 0)
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_kept_start_stands_for_its_alias_set(sign: int) -> None:
+    class Kept(Component):
+        T = Parameter("s", "time", default=0.5)
+        angle = Variable("1", "kept at the start", start=2.0, fixed=True)
+        x = Variable("1", "what the differential equation is written in", start=7.0)
+        pin = DcPort("terminal")
+        volt = Parameter("V", "base", default=1.0)
+        siemens = Parameter("S", "base", default=1.0)
+
+        def equations(self) -> None:
+            self.eq(self.angle, sign * self.x)
+            self.eq(self.T * self.der(self.x), self.pin.v / self.volt - self.x)
+            self.eq(self.pin.i, self.siemens * self.pin.v)
+
+    unit = flatten(Kept())
+    assert paths(unit) == ["angle"]
+    assert unit.n_states == 1
+    assert_solves(Kept(), solved_point(unit, Kept()))
+
+    class AtTerminal(Component):
+        """The same, but the state is the terminal's potential: it must not be merged with what is given there."""
+
+        C = Parameter("F", "capacitance", default=0.5)
+        v0 = Variable("V", "kept at the start", start=2.0, fixed=True)
+        v = Variable("V", "voltage")
+        pin = DcPort("terminal")
+
+        def equations(self) -> None:
+            self.eq(self.v0, sign * self.v)
+            self.eq(self.v, self.pin.v)
+            self.eq(self.C * self.der(self.v), self.pin.i)
+
+    unit = flatten(AtTerminal())
+    assert [u.path for u in unit.unknowns if u.der is not None] == ["v0"]
+    assert_solves(AtTerminal(), solved_point(unit, AtTerminal()))
+
+
 @pytest.mark.parametrize("second", [Pole(C=1.5), Inverse(C=1.5)])
 def test_two_states_that_are_equal_become_one(second: Pole) -> None:
     class TwoCapacitors(Component):

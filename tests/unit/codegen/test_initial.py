@@ -148,6 +148,21 @@ def test_a_kept_state_may_move_at_the_start(cache: KernelCache) -> None:
     assert found.table.start_derivative.tolist() == [pytest.approx(-1.5), 0.0]  # -3 / 2 s
 
 
+def test_a_kept_start_is_kept_under_an_alias(cache: KernelCache) -> None:
+    class Drifting(Component):
+        T = Parameter("s", "time constant", default=2.0)
+        angle = Variable("1", "kept", start=3.0, fixed=True)
+        x = Variable("1", "minus the angle, the name in the differential equation")
+
+        def equations(self) -> None:
+            self.eq(self.angle, -self.x)
+            self.eq(self.T * self.der(self.x), 1)
+
+    _, found, values = start(lone(Drifting()), cache)
+    assert values == {"it.angle": 3.0}
+    assert found.table.start_derivative.tolist() == [pytest.approx(-0.5)]
+
+
 def test_series_start_from_their_operating_value(cache: KernelCache) -> None:
     s = System()
     s.add("source", IdealSource(V=4.0))
