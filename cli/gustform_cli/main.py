@@ -63,7 +63,14 @@ def simulate(
 
 
 @app.command()
-def check(scenario: Scenario, overrides: Overrides = None, json: Json = False) -> None:
+def check(
+    scenario: Scenario,
+    overrides: Overrides = None,
+    json: Json = False,
+    model_file: Annotated[
+        Path | None, typer.Option("--model", metavar="FILE", help="also write the model that gust-run runs")
+    ] = None,
+) -> None:
     """Everything up to the linked model, no run: prints the model report."""
     with _errors():
         from gustform_cli.model import link, load
@@ -73,6 +80,10 @@ def check(scenario: Scenario, overrides: Overrides = None, json: Json = False) -
         model = link(load(scenario, overrides or []))
         report = model_report(model.built.linked)
         print(as_json(report, model) if json else as_text(report, model))
+        if model_file is not None:
+            from gustform_cli.model_file import write_model
+
+            write_model(model, model_file)
 
 
 @app.command()

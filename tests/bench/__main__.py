@@ -102,7 +102,9 @@ def bare(hours: float, repeats: int, folder: Path) -> dict[str, Any]:
              f"{result['ratio_with_output']:.2f}"],
         ],
     )  # fmt: skip
-    console.print(f"largest difference of an unknown at the end: {result['difference_at_end_of_nominal']:.1e} of nominal\n")
+    console.print(
+        f"largest difference of an unknown at the end: {result['difference_at_end_of_nominal']:.1e} of nominal\n"
+    )
     return result
 
 

@@ -13,10 +13,10 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from gustform_codegen.link import Linked
-from gustform_codegen.table import SystemTable
 from numpy.typing import NDArray
 
+from gustform_codegen.link import Linked
+from gustform_codegen.table import SystemTable
 from tests.support.flat import Flat, flatten_system, semi_explicit
 
 _HERE = Path(__file__).parent
@@ -95,7 +95,9 @@ class BareProgram:
 class CasadiIdas:
     """CasADi's idas on the same equations, with the wind as a linear interpolant of time."""
 
-    def __init__(self, linked: Linked, table: SystemTable, wind: Wind, until: float, rtol: float, atol: float, *, jit: bool) -> None:
+    def __init__(
+        self, linked: Linked, table: SystemTable, wind: Wind, until: float, rtol: float, atol: float, *, jit: bool
+    ) -> None:
         self.table = table
         begin = time.perf_counter()
         self.flat = flatten_system(linked, table)
@@ -107,7 +109,9 @@ class CasadiIdas:
         changing = ca.MX.sym("changing", s.changing.numel())
         grid = np.arange(wind.value.shape[0]) * wind.dt
         # lookup_mode exact: the grid is uniform, so the interval is found by a division.
-        speed = ca.interpolant("wind", "linear", [grid.tolist()], wind.value.ravel().tolist(), {"lookup_mode": ["exact"]})
+        speed = ca.interpolant(
+            "wind", "linear", [grid.tolist()], wind.value.ravel().tolist(), {"lookup_mode": ["exact"]}
+        )
         ode, alg = right(x, z, speed(t), changing)
         problem = {"x": x, "z": z, "t": t, "p": changing, "ode": ode, "alg": alg}
         options: dict[str, Any] = {
@@ -126,7 +130,8 @@ class CasadiIdas:
         self.pieces = [c[0] for c in self.flat.changes if c[0] < until]
         edges = [0.0, *sorted(set(self.pieces)), until]
         self.integrators = [
-            (a, b, ca.integrator("peer", "idas", problem, a, b, options)) for a, b in zip(edges, edges[1:], strict=False)
+            (a, b, ca.integrator("peer", "idas", problem, a, b, options))
+            for a, b in zip(edges, edges[1:], strict=False)
         ]
         self.build_seconds = time.perf_counter() - begin
 

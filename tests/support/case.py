@@ -7,14 +7,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import gustform_cli
 import numpy as np
+from numpy.typing import NDArray
+
+import gustform_cli
 from gustform_cli.assemble import Assembled
 from gustform_cli.model import Model, link, load
 from gustform_codegen.initial import steady_state
 from gustform_codegen.table import SystemTable
 from gustform_runtime import Simulation
-from numpy.typing import NDArray
 
 SCENARIOS = Path(gustform_cli.__file__).parent / "scenarios"
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
+
 from gustform_codegen.link import Linked
 from gustform_codegen.table import SystemTable
 
@@ -108,5 +109,12 @@ def semi_explicit(flat: Flat, nominal: np.ndarray[Any, Any] | None = None) -> Se
         full[int(i)] = z[k] * scale[i]
     value = ca.substitute(flat.residual, ca.vertcat(flat.y, flat.yp), ca.vertcat(full, ca.SX.zeros(flat.yp.numel())))
     return SemiExplicit(
-        x, z, flat.u, flat.changing, -value[x_index.tolist()] / scale[x_index], value[z_index.tolist()], x_index, z_index
+        x,
+        z,
+        flat.u,
+        flat.changing,
+        -value[x_index.tolist()] / scale[x_index],
+        value[z_index.tolist()],
+        x_index,
+        z_index,
     )
