@@ -27,7 +27,7 @@ extern "C" {
 /* C2 bicubic B-spline on a uniform grid; outside the grid the argument is clamped to its edge.
  * value(i, j) coefficients are stored row by row, (n_x + 2) x (n_y + 2). */
 typedef struct gust_table {
-    double x_start;       /* first grid line of x */
+    double x_start;        /* first grid line of x */
     double x_step_inverse; /* 1 / spacing */
     double y_start;
     double y_step_inverse;
@@ -38,21 +38,21 @@ typedef struct gust_table {
 
 /* Where and with which values one instance is evaluated. */
 typedef struct gust_point {
-    double t;          /* simulated time, s */
-    double cj;         /* weight of dF/dy' in the Jacobian; 0 where not used */
-    const double *y;   /* [n_unknowns] */
-    const double *yp;  /* [n_unknowns] time derivatives */
-    const double *w;   /* [n_external] */
-    const double *u;   /* [n_inputs] */
-    const double *d;   /* [n_discrete] */
-    const double *p;   /* [n_parameters] */
-    const double *c;   /* [n_constants] from prepare() */
+    double t;                        /* simulated time, s */
+    double cj;                       /* weight of dF/dy' in the Jacobian; 0 where not used */
+    const double *y;                 /* [n_unknowns] */
+    const double *yp;                /* [n_unknowns] time derivatives */
+    const double *w;                 /* [n_external] */
+    const double *u;                 /* [n_inputs] */
+    const double *d;                 /* [n_discrete] */
+    const double *p;                 /* [n_parameters] */
+    const double *c;                 /* [n_constants] from prepare() */
     const gust_table *const *tables; /* [n_tables] */
 } gust_point;
 
 typedef struct gust_kernel {
-    uint32_t abi;           /* GUST_KERNEL_ABI of the header it was compiled with */
-    const char *type_name;  /* for messages only */
+    uint32_t abi;          /* GUST_KERNEL_ABI of the header it was compiled with */
+    const char *type_name; /* for messages only */
     int32_t n_unknowns;
     int32_t n_external;
     int32_t n_inputs;
