@@ -47,8 +47,8 @@ demo: setup ## Set everything up and run the load-step scenario into ./demo
 	@$(BIN)/gustform simulate $(DEMO_SCENARIO) --out $(DEMO_OUT)
 
 .PHONY: test
-test: setup-dev ## Quick checks, C tests under sanitizers, then every Python test
-	@$(MAKE) check
+test: setup-dev ## All checks, C tests under sanitizers, then every Python test
+	@$(MAKE) lint
 	@$(MAKE) test-c
 	@$(MAKE) test-python
 
