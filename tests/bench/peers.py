@@ -5,6 +5,7 @@ Both get the flat system, the same start values, tolerances, wind samples and lo
 
 from __future__ import annotations
 
+import itertools
 import subprocess
 import time
 from dataclasses import dataclass
@@ -62,11 +63,9 @@ class BareProgram:
         folder.mkdir(parents=True, exist_ok=True)
         generator.generate(str(folder) + "/")
         self.program = folder / "bare"
-        subprocess.run(
-            ["cc", *_C_FLAGS, f"-I{folder}", "-I/usr/include/suitesparse", str(_HERE / "bare.c"), str(folder / "flat.c"),
-             "-o", str(self.program), *_LIBRARIES],
-            check=True,
-        )  # fmt: skip
+        sources = [str(_HERE / "bare.c"), str(folder / "flat.c")]
+        includes = [f"-I{folder}", "-I/usr/include/suitesparse"]
+        subprocess.run(["cc", *_C_FLAGS, *includes, *sources, "-o", str(self.program), *_LIBRARIES], check=True)
         self.folder = folder
         self.build_seconds = time.perf_counter() - begin
 
@@ -130,8 +129,7 @@ class CasadiIdas:
         self.pieces = [c[0] for c in self.flat.changes if c[0] < until]
         edges = [0.0, *sorted(set(self.pieces)), until]
         self.integrators = [
-            (a, b, ca.integrator("peer", "idas", problem, a, b, options))
-            for a, b in zip(edges, edges[1:], strict=False)
+            (a, b, ca.integrator("peer", "idas", problem, a, b, options)) for a, b in itertools.pairwise(edges)
         ]
         self.build_seconds = time.perf_counter() - begin
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from functools import cache
 from typing import Any
 
@@ -44,7 +45,7 @@ def _pieces(flat: Flat, until: float) -> list[tuple[float, float, list[float]]]:
     edges = [0.0, *sorted({at for at, _, _ in flat.changes}), until]
     values = list(flat.changing_start)
     result = []
-    for begin, end in zip(edges, edges[1:], strict=False):
+    for begin, end in itertools.pairwise(edges):
         for at, index, value in flat.changes:
             if at == begin:
                 values[index] = value

@@ -69,8 +69,13 @@ class Case:
         """Times, rows by channel name, statistics."""
         times: list[NDArray[np.float64]] = []
         rows: list[NDArray[np.float32]] = []
+
+        def keep(block_times: NDArray[np.float64], block: NDArray[np.float32]) -> None:
+            times.append(block_times.copy())
+            rows.append(block.copy())
+
         with self.simulation(channels, **options) as simulation:
-            simulation.set_sink(every, lambda t, v: (times.append(t.copy()), rows.append(v.copy())) and None)
+            simulation.set_sink(every, keep)
             simulation.initialise(0.0)
             simulation.advance(self.until if until is None else until)
             statistics = simulation.statistics()
