@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "lanes.h"
 #include "memory.h"
 
 /* Numbers of vectors that IDA combines at once: order + 1 = 6 at most, and one more. */
@@ -17,6 +18,17 @@ static inline const gust_vector *content(N_Vector vector)
 static inline double *data_of(N_Vector vector)
 {
     return __builtin_assume_aligned(((gust_vector *)vector->content)->data, 64);
+}
+
+/* The same as lanes, and how many there are. */
+static inline gust_lanes *lanes_of(N_Vector vector)
+{
+    return gust_lanes_of(content(vector)->data);
+}
+
+static inline int64_t lane_count(N_Vector vector)
+{
+    return (int64_t)((uint64_t)content(vector)->padded / GUST_LANES);
 }
 
 /* -- life ----------------------------------------------------------------------------------------------- */
@@ -96,11 +108,10 @@ static sunindextype get_length(N_Vector vector)
 
 static void linear_sum(sunrealtype a, N_Vector x, sunrealtype b, N_Vector y, N_Vector z)
 {
-    const int64_t n = content(x)->padded;
-    const double *xd = data_of(x);
-    const double *yd = data_of(y);
-    double *zd = data_of(z);
-    GUST_INDEPENDENT
+    const int64_t n = lane_count(x);
+    const gust_lanes *xd = lanes_of(x);
+    const gust_lanes *yd = lanes_of(y);
+    gust_lanes *zd = lanes_of(z);
     for (int64_t i = 0; i < n; ++i) {
         zd[i] = a * xd[i] + b * yd[i];
     }
@@ -108,6 +119,14 @@ static void linear_sum(sunrealtype a, N_Vector x, sunrealtype b, N_Vector y, N_V
 
 static void set_constant(sunrealtype c, N_Vector z)
 {
+    if (c == 0.0) {
+        const int64_t n_lanes = lane_count(z);
+        gust_lanes *lanes = lanes_of(z);
+        for (int64_t i = 0; i < n_lanes; ++i) {
+            lanes[i] = (gust_lanes){0.0};
+        }
+        return;
+    }
     const int64_t n = content(z)->length;
     double *zd = data_of(z);
     for (int64_t i = 0; i < n; ++i) {
@@ -117,11 +136,10 @@ static void set_constant(sunrealtype c, N_Vector z)
 
 static void product(N_Vector x, N_Vector y, N_Vector z)
 {
-    const int64_t n = content(x)->padded;
-    const double *xd = data_of(x);
-    const double *yd = data_of(y);
-    double *zd = data_of(z);
-    GUST_INDEPENDENT
+    const int64_t n = lane_count(x);
+    const gust_lanes *xd = lanes_of(x);
+    const gust_lanes *yd = lanes_of(y);
+    gust_lanes *zd = lanes_of(z);
     for (int64_t i = 0; i < n; ++i) {
         zd[i] = xd[i] * yd[i];
     }
@@ -141,16 +159,16 @@ static void divide(N_Vector x, N_Vector y, N_Vector z)
 
 static void scale(sunrealtype c, N_Vector x, N_Vector z)
 {
-    const int64_t n = content(x)->padded;
-    const double *xd = data_of(x);
-    double *zd = data_of(z);
+    const int64_t n = lane_count(x);
+    const gust_lanes *xd = lanes_of(x);
+    gust_lanes *zd = lanes_of(z);
     if (c == 1.0) {
-        if (xd != zd) {
-            memcpy(zd, xd, (size_t)n * sizeof *zd);
+        /* No memcpy: choosing among its variants takes longer than a few registers. */
+        for (int64_t i = 0; i < n; ++i) {
+            zd[i] = xd[i];
         }
         return;
     }
-    GUST_INDEPENDENT
     for (int64_t i = 0; i < n; ++i) {
         zd[i] = c * xd[i];
     }
@@ -199,58 +217,52 @@ static void compare(sunrealtype c, N_Vector x, N_Vector z)
     }
 }
 
-/* Sums run in GUST_VECTOR_BLOCK lanes that are added in a fixed order, so that the compiler may use vector
- * instructions without being allowed to reorder sums. */
-
-static inline double sum_of_lanes(const double *lane)
-{
-    return ((lane[0] + lane[4]) + (lane[2] + lane[6])) + ((lane[1] + lane[5]) + (lane[3] + lane[7]));
-}
+/* Sums run in the lanes of one block that are added in a fixed order, so that they need not be reordered. */
 
 static double dot_product(N_Vector x, N_Vector y)
 {
-    const int64_t n = content(x)->padded;
-    const double *xd = data_of(x);
-    const double *yd = data_of(y);
-    double lane[GUST_VECTOR_BLOCK] = {0.0};
-    for (int64_t i = 0; i < n; i += GUST_VECTOR_BLOCK) {
-        for (int k = 0; k < GUST_VECTOR_BLOCK; ++k) {
-            lane[k] += xd[i + k] * yd[i + k];
+    const int64_t n = lane_count(x);
+    const gust_lanes *xd = lanes_of(x);
+    const gust_lanes *yd = lanes_of(y);
+    gust_lanes sum[GUST_BLOCK_LANES] = {{0.0}};
+    for (int64_t i = 0; i < n; i += GUST_BLOCK_LANES) {
+        for (int k = 0; k < GUST_BLOCK_LANES; ++k) {
+            sum[k] += xd[i + k] * yd[i + k];
         }
     }
-    return sum_of_lanes(lane);
+    return gust_lane_sum(sum);
 }
 
 static double weighted_square_sum(N_Vector x, N_Vector w)
 {
-    const int64_t n = content(x)->padded;
-    const double *xd = data_of(x);
-    const double *wd = data_of(w);
-    double lane[GUST_VECTOR_BLOCK] = {0.0};
-    for (int64_t i = 0; i < n; i += GUST_VECTOR_BLOCK) {
-        for (int k = 0; k < GUST_VECTOR_BLOCK; ++k) {
-            const double term = xd[i + k] * wd[i + k];
-            lane[k] += term * term;
+    const int64_t n = lane_count(x);
+    const gust_lanes *xd = lanes_of(x);
+    const gust_lanes *wd = lanes_of(w);
+    gust_lanes sum[GUST_BLOCK_LANES] = {{0.0}};
+    for (int64_t i = 0; i < n; i += GUST_BLOCK_LANES) {
+        for (int k = 0; k < GUST_BLOCK_LANES; ++k) {
+            const gust_lanes term = xd[i + k] * wd[i + k];
+            sum[k] += term * term;
         }
     }
-    return sum_of_lanes(lane);
+    return gust_lane_sum(sum);
 }
 
 /* Only elements whose mask is positive count; all masks here are 0 or 1, so a factor does it. */
 static double weighted_square_sum_mask(N_Vector x, N_Vector w, N_Vector id)
 {
-    const int64_t n = content(x)->padded;
-    const double *xd = data_of(x);
-    const double *wd = data_of(w);
-    const double *md = data_of(id);
-    double lane[GUST_VECTOR_BLOCK] = {0.0};
-    for (int64_t i = 0; i < n; i += GUST_VECTOR_BLOCK) {
-        for (int k = 0; k < GUST_VECTOR_BLOCK; ++k) {
-            const double term = md[i + k] > 0.0 ? xd[i + k] * wd[i + k] : 0.0;
-            lane[k] += term * term;
+    const int64_t n = lane_count(x);
+    const gust_lanes *xd = lanes_of(x);
+    const gust_lanes *wd = lanes_of(w);
+    const gust_lanes *md = lanes_of(id);
+    gust_lanes sum[GUST_BLOCK_LANES] = {{0.0}};
+    for (int64_t i = 0; i < n; i += GUST_BLOCK_LANES) {
+        for (int k = 0; k < GUST_BLOCK_LANES; ++k) {
+            const gust_lanes term = xd[i + k] * wd[i + k] * md[i + k];
+            sum[k] += term * term;
         }
     }
-    return sum_of_lanes(lane);
+    return gust_lane_sum(sum);
 }
 
 static double wrms_norm(N_Vector x, N_Vector w)
@@ -270,15 +282,13 @@ static double wl2_norm(N_Vector x, N_Vector w)
 
 static double l1_norm(N_Vector x)
 {
-    const int64_t n = content(x)->padded;
+    const int64_t n = content(x)->length;
     const double *xd = data_of(x);
-    double lane[GUST_VECTOR_BLOCK] = {0.0};
-    for (int64_t i = 0; i < n; i += GUST_VECTOR_BLOCK) {
-        for (int k = 0; k < GUST_VECTOR_BLOCK; ++k) {
-            lane[k] += fabs(xd[i + k]);
-        }
+    double sum = 0.0;
+    for (int64_t i = 0; i < n; ++i) {
+        sum += fabs(xd[i]);
     }
-    return sum_of_lanes(lane);
+    return sum;
 }
 
 static double max_norm(N_Vector x)
@@ -356,18 +366,18 @@ static double minimum_quotient(N_Vector numerator, N_Vector denominator)
 /* One loop for each number of vectors, so that everything stays in registers. Reading all inputs of an
  * element before writing it makes z = X[k] harmless. */
 #define COMBINE(EXPRESSION)                                                                                    \
-    GUST_INDEPENDENT for (int64_t i = 0; i < n; ++i)                                                           \
+    for (int64_t i = 0; i < n; ++i)                                                                            \
     {                                                                                                          \
         zd[i] = EXPRESSION;                                                                                    \
     }
 
 static int linear_combination(int count, sunrealtype *c, N_Vector *x, N_Vector z)
 {
-    const int64_t n = content(z)->padded;
-    double *zd = data_of(z);
-    const double *v[MAX_FUSED];
+    const int64_t n = lane_count(z);
+    gust_lanes *zd = lanes_of(z);
+    const gust_lanes *v[MAX_FUSED];
     for (int k = 0; k < count && k < MAX_FUSED; ++k) {
-        v[k] = data_of(x[k]);
+        v[k] = lanes_of(x[k]);
     }
     switch (count) {
     case 1:
@@ -409,9 +419,9 @@ static int linear_combination(int count, sunrealtype *c, N_Vector *x, N_Vector z
         return -1;
     }
     for (int64_t i = 0; i < n; ++i) {
-        double sum = 0.0;
+        gust_lanes sum = {0.0};
         for (int k = 0; k < count; ++k) {
-            sum += c[k] * content(x[k])->data[i];
+            sum += c[k] * lanes_of(x[k])[i];
         }
         zd[i] = sum;
     }
@@ -536,7 +546,7 @@ N_Vector gust_vector_new(int64_t length, SUNContext context)
         return NULL;
     }
     inside->length = length;
-    inside->padded = (length + GUST_VECTOR_BLOCK - 1) / GUST_VECTOR_BLOCK * GUST_VECTOR_BLOCK;
+    inside->padded = gust_lane_padded(length);
     inside->data = gust_allocate((size_t)inside->padded, sizeof(double));
     made->content = inside;
     if (inside->data == NULL) {
