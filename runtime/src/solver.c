@@ -10,23 +10,37 @@
 
 /* -- what IDA calls ------------------------------------------------------------------------------------- */
 
-static int residual(sunrealtype t, N_Vector y, N_Vector yp, N_Vector r, void *user_data)
+/* F at a point of the iteration; whether it is finite shows later, see newton.h. */
+static int iteration_residual(double t, N_Vector y, N_Vector yp, N_Vector r, void *user_data)
 {
     gust_solver *solver = user_data;
-    double *values = gust_vector_data(r);
     solver->last_t = t;
     solver->last_y = y;
     solver->last_yp = yp;
-    if (!gust_system_residual(solver->system, t, gust_vector_data(y), gust_vector_data(yp), values)) {
-        return -1;
-    }
-    const int32_t row = gust_system_not_finite(solver->system, values);
+    return gust_system_residual(solver->system, t, gust_vector_data(y), gust_vector_data(yp),
+                                gust_vector_data(r))
+               ? 0
+               : -1;
+}
+
+static bool finite(double t, N_Vector r, void *user_data)
+{
+    gust_solver *solver = user_data;
+    const int32_t row = gust_system_not_finite(solver->system, gust_vector_data(r));
     if (row >= 0) {
         solver->bad_row = row;
         solver->bad_row_t = t;
-        return 1;
     }
-    return 0;
+    return row < 0;
+}
+
+/* For what IDA itself evaluates. */
+static int residual(sunrealtype t, N_Vector y, N_Vector yp, N_Vector r, void *user_data)
+{
+    if (iteration_residual(t, y, yp, r, user_data) != 0) {
+        return -1;
+    }
+    return finite(t, r, user_data) ? 0 : 1;
 }
 
 /* An iteration that did not converge casts doubt on the pivots: their growth is looked at with the next
@@ -164,8 +178,11 @@ gust_status gust_solver_create(gust_solver *solver, gust_system *system, gust_ev
     solver->matrix = gust_matrix_new(model->n_nonzeros, solver->context);
     solver->linear = gust_klu_new(&solver->factors, solver->context);
     solver->ida = IDACreate(solver->context);
+    solver->newton = (gust_newton){.factors = &solver->factors, .residual = iteration_residual, .finite = finite};
+    solver->nonlinear = gust_newton_new(&solver->newton, solver->y, solver->context);
     if (solver->yp == NULL || solver->dense_y == NULL || solver->dense_yp == NULL || solver->mask == NULL ||
-        solver->absolute == NULL || solver->matrix == NULL || solver->linear == NULL || solver->ida == NULL) {
+        solver->absolute == NULL || solver->matrix == NULL || solver->linear == NULL || solver->nonlinear == NULL ||
+        solver->ida == NULL) {
         return no_memory(message, size);
     }
     return GUST_OK;
@@ -175,6 +192,9 @@ void gust_solver_free(gust_solver *solver)
 {
     if (solver->ida != NULL) {
         IDAFree(&solver->ida);
+    }
+    if (solver->nonlinear != NULL) {
+        SUNNonlinSolFree(solver->nonlinear);
     }
     if (solver->linear != NULL) {
         SUNLinSolFree(solver->linear);
@@ -215,6 +235,7 @@ static bool set_options(gust_solver *solver)
     good = good && IDASetMaxStep(ida, options->max_step) == IDA_SUCCESS;
     good = good && IDASetLinearSolver(ida, solver->linear, solver->matrix) == IDA_SUCCESS;
     good = good && IDASetJacFn(ida, jacobian) == IDA_SUCCESS;
+    good = good && IDASetNonlinearSolver(ida, solver->nonlinear) == IDA_SUCCESS;
     good = good && IDASetNonlinConvCoef(ida, options->nonlinear_coefficient) == IDA_SUCCESS;
     good = good && IDASetMaxNonlinIters(ida, (int)options->nonlinear_iterations) == IDA_SUCCESS;
     good = good && IDASetDeltaCjLSetup(ida, options->cj_change) == IDA_SUCCESS;

@@ -7,6 +7,7 @@
 
 #include "events.h"
 #include "linear.h"
+#include "newton.h"
 #include "options.h"
 #include "sundials_compat.h"
 #include "system.h"
@@ -28,6 +29,8 @@ typedef struct gust_solver {
     N_Vector absolute; /* absolute tolerance */
     SUNMatrix matrix;
     SUNLinearSolver linear;
+    SUNNonlinearSolver nonlinear;
+    gust_newton newton;
     klu_common common;
     klu_symbolic *symbolic;
     gust_factors factors;
