@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "diagnose.h"
+#include "lanes.h"
 #include "memory.h"
 #include "text.h"
 
@@ -12,7 +13,7 @@ gust_status gust_initial_create(gust_initial *initial, gust_system *system, cons
 {
     const gust_model *model = system->model;
     /* Rounded up as gust_lu_solve wants it. */
-    const size_t n = ((size_t)model->n_unknowns + GUST_LU_LANES - 1) / GUST_LU_LANES * GUST_LU_LANES;
+    const size_t n = (size_t)gust_lane_padded(model->n_unknowns);
     const size_t n_nonzeros = (size_t)model->n_nonzeros;
     *initial = (gust_initial){.system = system, .options = options};
     gust_factors_start(&initial->factors, model->n_unknowns, model->column_start, model->row_index, symbolic,

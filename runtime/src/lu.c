@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "lanes.h"
 #include "memory.h"
 
 /* -- plan ----------------------------------------------------------------------------------------------- */
@@ -28,7 +29,7 @@ static bool allocate_pivots(gust_lu *lu, int32_t n, int32_t n_nonzeros)
     lu->row_scale = gust_allocate(count, sizeof(double));
     lu->work = gust_allocate(count, sizeof(double));
     if (n <= GUST_LU_DENSE) {
-        lu->padded = (n + GUST_LU_LANES - 1) / GUST_LU_LANES * GUST_LU_LANES;
+        lu->padded = (int32_t)gust_lane_padded(n);
         lu->inverse = gust_allocate(count * (size_t)lu->padded, sizeof(double));
         if (lu->inverse == NULL) {
             return false;
@@ -414,10 +415,7 @@ double gust_lu_growth(const gust_lu *lu, const double *values)
     return smallest;
 }
 
-/* Eight doubles that are worked on together, whatever the machine makes of them. */
-typedef double lanes __attribute__((vector_size(GUST_LU_LANES * sizeof(double)), may_alias));
-
-static inline void subtract(lanes *target, double factor, const lanes *source, int32_t n_lanes)
+static inline void subtract(gust_lanes *target, double factor, const gust_lanes *source, int32_t n_lanes)
 {
     for (int32_t v = 0; v < n_lanes; ++v) {
         target[v] -= factor * source[v];
@@ -429,89 +427,95 @@ static inline void subtract(lanes *target, double factor, const lanes *source, i
 static void invert(gust_lu *lu)
 {
     const int32_t n = lu->n;
-    const int32_t n_lanes = lu->padded / GUST_LU_LANES;
-    lanes *rows = (lanes *)(void *)lu->inverse;
+    const int32_t n_lanes = lu->padded / GUST_LANES;
+    gust_lanes *rows = gust_lanes_of(lu->inverse);
     memset(lu->inverse, 0, (size_t)n * (size_t)lu->padded * sizeof(double));
     for (int32_t k = 0; k < n; ++k) {
-        lu->inverse[(int64_t)k * lu->padded + lu->column_of[k]] = 1.0;
+        lu->inverse[(int64_t)lu->row_of[k] * lu->padded + lu->column_of[k]] = 1.0;
     }
     for (int32_t e = lu->u_start[0] - 1; e >= 0; --e) {
-        subtract(rows + (int64_t)lu->u_column[e] * n_lanes, lu->u_value[e],
-                 rows + (int64_t)lu->u_row[e] * n_lanes, n_lanes);
+        subtract(rows + (int64_t)lu->row_of[lu->u_column[e]] * n_lanes, lu->u_value[e],
+                 rows + (int64_t)lu->row_of[lu->u_row[e]] * n_lanes, n_lanes);
     }
     for (int32_t k = 0; k < n; ++k) {
-        lanes *row = rows + (int64_t)k * n_lanes;
+        gust_lanes *row = rows + (int64_t)lu->row_of[k] * n_lanes;
         for (int32_t v = 0; v < n_lanes; ++v) {
             row[v] *= lu->pivot_inverse[k];
         }
     }
     for (int32_t e = lu->l_start[n] - 1; e >= 0; --e) {
-        subtract(rows + (int64_t)lu->l_column[e] * n_lanes, lu->l_value[e],
-                 rows + (int64_t)lu->l_row[e] * n_lanes, n_lanes);
+        subtract(rows + (int64_t)lu->row_of[lu->l_column[e]] * n_lanes, lu->l_value[e],
+                 rows + (int64_t)lu->row_of[lu->l_row[e]] * n_lanes, n_lanes);
     }
     lu->inverted = true;
 }
 
-/* Sum of columns, all of whose elements stay in registers. */
-__attribute__((always_inline)) static inline void multiply(const gust_lu *lu, const double *right,
-                                                           double *solution, const int n_lanes)
+/* Registers that the sums below may take, in two sets. */
+#if defined(__AVX512F__)
+enum { MOST_SUMS = 8 };
+#else
+enum { MOST_SUMS = 6 };
+#endif
+
+/* `n_sums` lanes of the sum of columns, all in registers. Columns are `stride` lanes apart. */
+__attribute__((always_inline)) static inline void add_columns(const gust_lanes *column, int64_t stride, int32_t n,
+                                                              const double *right, gust_lanes *solution,
+                                                              const int n_sums)
 {
-    const lanes *column = (const lanes *)(const void *)lu->inverse;
     /* Two sums, so that an addition need not wait for the one before it. */
-    lanes even[GUST_LU_DENSE / GUST_LU_LANES];
-    lanes odd[GUST_LU_DENSE / GUST_LU_LANES];
-    for (int v = 0; v < n_lanes; ++v) {
-        even[v] = (lanes){0.0};
-        odd[v] = (lanes){0.0};
+    gust_lanes even[MOST_SUMS];
+    gust_lanes odd[MOST_SUMS];
+    for (int v = 0; v < n_sums; ++v) {
+        even[v] = (gust_lanes){0.0};
+        odd[v] = (gust_lanes){0.0};
     }
     int32_t k = 0;
-    for (; k + 1 < lu->n; k += 2, column += 2 * (int64_t)n_lanes) {
-        const double first = right[lu->row_of[k]];
-        const double second = right[lu->row_of[k + 1]];
-        for (int v = 0; v < n_lanes; ++v) {
-            even[v] += column[v] * first;
-            odd[v] += column[(int64_t)n_lanes + v] * second;
+    for (; k + 1 < n; k += 2, column += 2 * stride) {
+        for (int v = 0; v < n_sums; ++v) {
+            even[v] += column[v] * right[k];
+            odd[v] += column[stride + v] * right[k + 1];
         }
     }
-    if (k < lu->n) {
-        const double last = right[lu->row_of[k]];
-        for (int v = 0; v < n_lanes; ++v) {
-            even[v] += column[v] * last;
+    if (k < n) {
+        for (int v = 0; v < n_sums; ++v) {
+            even[v] += column[v] * right[k];
         }
     }
-    for (int v = 0; v < n_lanes; ++v) {
-        even[v] += odd[v];
+    for (int v = 0; v < n_sums; ++v) {
+        solution[v] = even[v] + odd[v];
     }
-    memcpy(solution, even, (size_t)n_lanes * sizeof *even);
 }
 
 static void apply_inverse(const gust_lu *lu, const double *right, double *solution)
 {
-    switch (lu->padded / GUST_LU_LANES) {
-    case 1:
-        multiply(lu, right, solution, 1);
+    const int64_t n_lanes = lu->padded / GUST_LANES;
+    const gust_lanes *columns = gust_lanes_in(lu->inverse);
+    gust_lanes sum[GUST_LU_DENSE / GUST_LANES]; /* `right` may be the same array as `solution` */
+    int64_t v = 0;
+    while (v < n_lanes) {
+        const int64_t left = n_lanes - v;
+        switch (left < MOST_SUMS ? left : MOST_SUMS) {
+#define ADD_COLUMNS(N)                                                                                         \
+    case N:                                                                                                    \
+        add_columns(columns + v, n_lanes, lu->n, right, sum + v, N);                                           \
+        v += N;                                                                                                \
         break;
-    case 2:
-        multiply(lu, right, solution, 2);
-        break;
-    case 3:
-        multiply(lu, right, solution, 3);
-        break;
-    case 4:
-        multiply(lu, right, solution, 4);
-        break;
-    case 5:
-        multiply(lu, right, solution, 5);
-        break;
-    case 6:
-        multiply(lu, right, solution, 6);
-        break;
-    case 7:
-        multiply(lu, right, solution, 7);
-        break;
-    default:
-        multiply(lu, right, solution, 8);
-        break;
+            ADD_COLUMNS(1)
+            ADD_COLUMNS(2)
+            ADD_COLUMNS(3)
+            ADD_COLUMNS(4)
+            ADD_COLUMNS(5)
+            ADD_COLUMNS(6)
+#if defined(__AVX512F__)
+            ADD_COLUMNS(7)
+            ADD_COLUMNS(8)
+#endif
+#undef ADD_COLUMNS
+        }
+    }
+    gust_lanes *result = gust_lanes_of(solution);
+    for (v = 0; v < n_lanes; ++v) {
+        result[v] = sum[v];
     }
 }
 

@@ -21,7 +21,6 @@
 #include <stdint.h>
 
 enum {
-    GUST_LU_LANES = 8,   /* elements that one vector instruction takes */
     GUST_LU_DENSE = 64,  /* largest system of which the inverse is used */
     GUST_LU_PATIENCE = 3 /* solves before the inverse is worked out, which costs about as many */
 };
@@ -60,7 +59,7 @@ typedef struct gust_lu {
     double *row_scale;      /* [n] 1 / largest entry of the row when the pivots were chosen */
     double *work;           /* [n], zero between calls of gust_lu_factor */
     int32_t singular_pivot; /* pivot number at which the last factorisation failed */
-    /* small systems: A^-1 by columns, [n] columns of `padded` elements in the order of pivots */
+    /* small systems: A^-1 by columns, [n] columns of `padded` elements */
     int32_t padded;
     int32_t solves;  /* with the present factors */
     bool inverted;   /* inverse holds for the present factors */
@@ -80,7 +79,7 @@ bool gust_lu_factor(gust_lu *lu, const double *values);
  * entry of U), rows scaled. 1 is perfect, 1e-16 leaves no correct digit. */
 double gust_lu_growth(const gust_lu *lu, const double *values);
 
-/* solution = A^-1 right; both [n rounded up to GUST_LU_LANES], or shorter only if n is larger than
+/* solution = A^-1 right; both [gust_lane_padded(n)] on a cache line, or shorter only if n is larger than
  * GUST_LU_DENSE; the two may be one array. Elements beyond n of the solution are set to 0. */
 void gust_lu_solve(gust_lu *lu, const double *right, double *solution);
 
