@@ -42,6 +42,34 @@ static bool create_block(gust_assembly *assembly, gust_block *block, const gust_
     return true;
 }
 
+static bool list_instances(gust_assembly *assembly)
+{
+    const gust_model *model = assembly->model;
+    int64_t count = 0;
+    for (int32_t t = 0; t < model->n_types; ++t) {
+        count += model->types[t].n_instances;
+    }
+    assembly->instances = gust_allocate((size_t)count, sizeof *assembly->instances);
+    if (assembly->instances == NULL) {
+        return false;
+    }
+    for (int32_t t = 0; t < model->n_types; ++t) {
+        const gust_model_type *type = &model->types[t];
+        const gust_kernel *kernel = type->kernel;
+        for (int32_t i = 0; i < type->n_instances; ++i) {
+            assembly->instances[assembly->n_instances++] =
+                (gust_instance){.residual = kernel->residual,
+                                .point = &assembly->blocks[t].point[i],
+                                .external = type->external + (int64_t)i * kernel->n_external,
+                                .flow_row = type->flow_row + (int64_t)i * kernel->n_flows,
+                                .n_external = kernel->n_external,
+                                .n_flows = kernel->n_flows,
+                                .first_unknown = type->first_unknown[i]};
+        }
+    }
+    return true;
+}
+
 gust_status gust_assembly_create(gust_assembly *assembly, const gust_model *model)
 {
     *assembly = (gust_assembly){.model = model};
@@ -80,7 +108,7 @@ gust_status gust_assembly_create(gust_assembly *assembly, const gust_model *mode
             return GUST_OUT_OF_MEMORY;
         }
     }
-    return GUST_OK;
+    return list_instances(assembly) ? GUST_OK : GUST_OUT_OF_MEMORY;
 }
 
 void gust_assembly_free(gust_assembly *assembly)
@@ -92,6 +120,7 @@ void gust_assembly_free(gust_assembly *assembly)
         gust_release(assembly->blocks[t].tables);
     }
     gust_release(assembly->blocks);
+    gust_release(assembly->instances);
     gust_release(assembly->inputs);
     gust_release(assembly->discrete);
     gust_release(assembly->shared);
@@ -125,22 +154,24 @@ void gust_assembly_residual(gust_assembly *assembly, double t, const double *y, 
                             double *residual)
 {
     const gust_model *model = assembly->model;
+    double *shared = assembly->shared;
     double *flow = assembly->flow;
     for (int32_t k = 0; k < model->n_unowned; ++k) {
         residual[model->unowned[k]] = 0.0;
     }
-    for (int32_t b = 0; b < model->n_types; ++b) {
-        const gust_block *block = &assembly->blocks[b];
-        const gust_model_type *type = block->type;
-        const gust_kernel *kernel = type->kernel;
-        const int32_t n_flows = kernel->n_flows;
-        for (int32_t i = 0; i < type->n_instances; ++i) {
-            const gust_point *point = point_at(assembly, block, i, t, 0.0, y, yp);
-            kernel->residual(point, residual + type->first_unknown[i], flow);
-            const int32_t *flow_row = type->flow_row + (int64_t)i * n_flows;
-            for (int32_t k = 0; k < n_flows; ++k) {
-                residual[flow_row[k]] += flow[k];
-            }
+    const gust_instance *end = assembly->instances + assembly->n_instances;
+    for (const gust_instance *instance = assembly->instances; instance < end; ++instance) {
+        for (int32_t k = 0; k < instance->n_external; ++k) {
+            shared[k] = y[instance->external[k]];
+        }
+        gust_point *point = instance->point;
+        point->t = t;
+        point->cj = 0.0;
+        point->y = y + instance->first_unknown;
+        point->yp = yp + instance->first_unknown;
+        instance->residual(point, residual + instance->first_unknown, flow);
+        for (int32_t k = 0; k < instance->n_flows; ++k) {
+            residual[instance->flow_row[k]] += flow[k];
         }
     }
 }

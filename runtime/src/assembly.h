@@ -24,9 +24,23 @@ typedef struct gust_block {
     bool watched;           /* its roots are to be looked at */
 } gust_block;
 
+/* What the residual needs to know of one instance, gathered from block, type and kernel: with four instances
+ * the way to these took longer than the small kernels themselves. */
+typedef struct gust_instance {
+    void (*residual)(const gust_point *at, double *residual, double *flow);
+    gust_point *point;
+    const int32_t *external; /* [n_external] */
+    const int32_t *flow_row; /* [n_flows] */
+    int32_t n_external;
+    int32_t n_flows;
+    int32_t first_unknown;
+} gust_instance;
+
 typedef struct gust_assembly {
     const gust_model *model;
     gust_block *blocks;
+    gust_instance *instances; /* [n_instances] of all types, in order */
+    int64_t n_instances;
     double *inputs;   /* [n_inputs] for the time being evaluated */
     double *discrete; /* [n_discrete] of all instances; the blocks point into it */
     double *shared;   /* scratch, the largest n_external */

@@ -490,7 +490,10 @@ static void apply_inverse(const gust_lu *lu, const double *right, double *soluti
 {
     const int64_t n_lanes = lu->padded / GUST_LANES;
     const gust_lanes *columns = gust_lanes_in(lu->inverse);
-    gust_lanes sum[GUST_LU_DENSE / GUST_LANES]; /* `right` may be the same array as `solution` */
+    gust_lanes *result = gust_lanes_of(solution);
+    /* `right` may be the same array as `solution`: what is read more than once waits elsewhere. */
+    gust_lanes waiting[GUST_LU_DENSE / GUST_LANES];
+    gust_lanes *sum = n_lanes > MOST_SUMS ? waiting : result;
     int64_t v = 0;
     while (v < n_lanes) {
         const int64_t left = n_lanes - v;
@@ -513,8 +516,7 @@ static void apply_inverse(const gust_lu *lu, const double *right, double *soluti
 #undef ADD_COLUMNS
         }
     }
-    gust_lanes *result = gust_lanes_of(solution);
-    for (v = 0; v < n_lanes; ++v) {
+    for (v = 0; sum != result && v < n_lanes; ++v) {
         result[v] = sum[v];
     }
 }
