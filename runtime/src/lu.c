@@ -458,8 +458,8 @@ enum { MOST_SUMS = 6 };
 #endif
 
 /* `n_sums` lanes of the sum of columns, all in registers. Columns are `stride` lanes apart. */
-__attribute__((always_inline)) static inline void add_columns(const gust_lanes *column, int64_t stride, int32_t n,
-                                                              const double *right, gust_lanes *solution,
+__attribute__((always_inline)) static inline void add_columns(const gust_lanes *column, int64_t stride,
+                                                              int32_t n, const double *right, double *solution,
                                                               const int n_sums)
 {
     /* Two sums, so that an addition need not wait for the one before it. */
@@ -482,7 +482,8 @@ __attribute__((always_inline)) static inline void add_columns(const gust_lanes *
         }
     }
     for (int v = 0; v < n_sums; ++v) {
-        solution[v] = even[v] + odd[v];
+        even[v] += odd[v];
+        memcpy(solution + (int64_t)v * GUST_LANES, &even[v], sizeof even[v]); /* on any address */
     }
 }
 
@@ -490,17 +491,16 @@ static void apply_inverse(const gust_lu *lu, const double *right, double *soluti
 {
     const int64_t n_lanes = lu->padded / GUST_LANES;
     const gust_lanes *columns = gust_lanes_in(lu->inverse);
-    gust_lanes *result = gust_lanes_of(solution);
     /* `right` may be the same array as `solution`: what is read more than once waits elsewhere. */
-    gust_lanes waiting[GUST_LU_DENSE / GUST_LANES];
-    gust_lanes *sum = n_lanes > MOST_SUMS ? waiting : result;
+    double waiting[GUST_LU_DENSE];
+    double *sum = n_lanes > MOST_SUMS ? waiting : solution;
     int64_t v = 0;
     while (v < n_lanes) {
         const int64_t left = n_lanes - v;
         switch (left < MOST_SUMS ? left : MOST_SUMS) {
 #define ADD_COLUMNS(N)                                                                                         \
     case N:                                                                                                    \
-        add_columns(columns + v, n_lanes, lu->n, right, sum + v, N);                                           \
+        add_columns(columns + v, n_lanes, lu->n, right, sum + v * GUST_LANES, N);                              \
         v += N;                                                                                                \
         break;
             ADD_COLUMNS(1)
@@ -516,8 +516,8 @@ static void apply_inverse(const gust_lu *lu, const double *right, double *soluti
 #undef ADD_COLUMNS
         }
     }
-    for (v = 0; sum != result && v < n_lanes; ++v) {
-        result[v] = sum[v];
+    if (sum == waiting) {
+        memcpy(solution, waiting, (size_t)lu->padded * sizeof *solution);
     }
 }
 

@@ -79,7 +79,7 @@ bool gust_lu_factor(gust_lu *lu, const double *values);
  * entry of U), rows scaled. 1 is perfect, 1e-16 leaves no correct digit. */
 double gust_lu_growth(const gust_lu *lu, const double *values);
 
-/* solution = A^-1 right; both [gust_lane_padded(n)] on a cache line, or shorter only if n is larger than
+/* solution = A^-1 right; both [gust_lane_padded(n)], or shorter only if n is larger than
  * GUST_LU_DENSE; the two may be one array. Elements beyond n of the solution are set to 0. */
 void gust_lu_solve(gust_lu *lu, const double *right, double *solution);
 

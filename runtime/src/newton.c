@@ -13,7 +13,7 @@ static const double FRESH_CONTRACTION = 20.0;
 static const double STALE_CONTRACTION = 100.0;
 static const double NEGLIGIBLE = 1e-8;
 
-/* What IDA says about the step to be solved: y = y_predicted + correction, y' = y'_predicted + cj correction. */
+/* The step to be solved, from IDA: y = y_predicted + correction, y' = y'_predicted + cj correction. */
 typedef struct step_data {
     double t;
     double cj;

@@ -178,11 +178,12 @@ gust_status gust_solver_create(gust_solver *solver, gust_system *system, gust_ev
     solver->matrix = gust_matrix_new(model->n_nonzeros, solver->context);
     solver->linear = gust_klu_new(&solver->factors, solver->context);
     solver->ida = IDACreate(solver->context);
-    solver->newton = (gust_newton){.factors = &solver->factors, .residual = iteration_residual, .finite = finite};
+    solver->newton =
+        (gust_newton){.factors = &solver->factors, .residual = iteration_residual, .finite = finite};
     solver->nonlinear = gust_newton_new(&solver->newton, solver->y, solver->context);
     if (solver->yp == NULL || solver->dense_y == NULL || solver->dense_yp == NULL || solver->mask == NULL ||
-        solver->absolute == NULL || solver->matrix == NULL || solver->linear == NULL || solver->nonlinear == NULL ||
-        solver->ida == NULL) {
+        solver->absolute == NULL || solver->matrix == NULL || solver->linear == NULL ||
+        solver->nonlinear == NULL || solver->ida == NULL) {
         return no_memory(message, size);
     }
     return GUST_OK;

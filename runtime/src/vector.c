@@ -366,8 +366,7 @@ static double minimum_quotient(N_Vector numerator, N_Vector denominator)
 /* One loop for each number of vectors, so that everything stays in registers. Reading all inputs of an
  * element before writing it makes z = X[k] harmless. */
 #define COMBINE(EXPRESSION)                                                                                    \
-    for (int64_t i = 0; i < n; ++i)                                                                            \
-    {                                                                                                          \
+    for (int64_t i = 0; i < n; ++i) {                                                                          \
         zd[i] = EXPRESSION;                                                                                    \
     }
 

@@ -8,6 +8,7 @@
 
 #include <cmocka.h>
 
+#include "lanes.h"
 #include "linear.h"
 
 enum { LARGEST = 90 };
@@ -50,8 +51,8 @@ static void fill(sparse *a, int32_t n, double density)
 
 static void check_solve(const sparse *a, gust_factors *factors)
 {
-    double right[LARGEST + GUST_LU_LANES] = {0.0};
-    double solution[LARGEST + GUST_LU_LANES];
+    double right[LARGEST + GUST_LANE_BLOCK] = {0.0};
+    double solution[LARGEST + GUST_LANE_BLOCK];
     double left[LARGEST] = {0.0};
     for (int32_t i = 0; i < a->n; ++i) {
         right[i] = pow(10.0, (double)(i % 7) - 3.0) * (2.0 * number() - 1.0);
@@ -116,7 +117,7 @@ static void new_pivots(void **state)
     values[0] = 1e-14;
     assert_true(gust_factors_set(&factors, values));
     assert_int_equal(factors.factorisations, 2);
-    double x[GUST_LU_LANES] = {1.0, 4.0}; /* x = (1, 1) up to 1e-14 */
+    double x[GUST_LANE_BLOCK] = {1.0, 4.0}; /* x = (1, 1) up to 1e-14 */
     gust_factors_solve(&factors, x, x);
     assert_true(fabs(x[0] - 1.0) < 1e-12 && fabs(x[1] - 1.0) < 1e-12);
     /* singular: [[1, 1], [1, 1]] */
