@@ -22,7 +22,7 @@
 
 enum {
     GUST_LU_DENSE = 64,  /* largest system of which the inverse is used */
-    GUST_LU_PATIENCE = 3 /* solves before the inverse is worked out, which costs about as many */
+    GUST_LU_PATIENCE = 1 /* solves before the inverse is worked out: a Newton step alone does without */
 };
 
 typedef struct gust_lu {
