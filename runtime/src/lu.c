@@ -491,33 +491,48 @@ static void apply_inverse(const gust_lu *lu, const double *right, double *soluti
 {
     const int64_t n_lanes = lu->padded / GUST_LANES;
     const gust_lanes *columns = gust_lanes_in(lu->inverse);
-    /* `right` may be the same array as `solution`: what is read more than once waits elsewhere. */
-    double waiting[GUST_LU_DENSE];
-    double *sum = n_lanes > MOST_SUMS ? waiting : solution;
+    /* `right` may be the same array as `solution`: what is read again after a part of that is written is kept.
+     */
+    double kept[GUST_LU_DENSE];
+    if (n_lanes > MOST_SUMS) {
+        memcpy(kept, right, (size_t)lu->n * sizeof *right);
+        right = kept;
+    }
     int64_t v = 0;
     while (v < n_lanes) {
         const int64_t left = n_lanes - v;
-        switch (left < MOST_SUMS ? left : MOST_SUMS) {
-#define ADD_COLUMNS(N)                                                                                         \
-    case N:                                                                                                    \
-        add_columns(columns + v, n_lanes, lu->n, right, sum + v * GUST_LANES, N);                              \
-        v += N;                                                                                                \
-        break;
-            ADD_COLUMNS(1)
-            ADD_COLUMNS(2)
-            ADD_COLUMNS(3)
-            ADD_COLUMNS(4)
-            ADD_COLUMNS(5)
-            ADD_COLUMNS(6)
+        const int64_t n_sums = left < MOST_SUMS ? left : MOST_SUMS;
+        switch (n_sums) {
+#define ADD_COLUMNS(N) add_columns(columns + v, n_lanes, lu->n, right, solution + v * GUST_LANES, N)
+        case 1:
+            ADD_COLUMNS(1);
+            break;
+        case 2:
+            ADD_COLUMNS(2);
+            break;
+        case 3:
+            ADD_COLUMNS(3);
+            break;
+        case 4:
+            ADD_COLUMNS(4);
+            break;
+        case 5:
+            ADD_COLUMNS(5);
+            break;
 #if defined(__AVX512F__)
-            ADD_COLUMNS(7)
-            ADD_COLUMNS(8)
+        case 6:
+            ADD_COLUMNS(6);
+            break;
+        case 7:
+            ADD_COLUMNS(7);
+            break;
 #endif
+        default:
+            ADD_COLUMNS(MOST_SUMS);
+            break;
 #undef ADD_COLUMNS
         }
-    }
-    if (sum == waiting) {
-        memcpy(solution, waiting, (size_t)lu->padded * sizeof *solution);
+        v += n_sums;
     }
 }
 
