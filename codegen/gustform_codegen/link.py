@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import fnmatch
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -86,32 +86,45 @@ class Linked:
         channels: dict[tuple[int, int, int], Channel] = {}
         aliases: dict[str, tuple[str, int]] = {}
         for pattern in patterns:
-            # Square brackets are instance numbers here, not character classes.
-            escaped = pattern.replace("[", "\0").replace("]", "[]]").replace("\0", "[[]")
-            matches = re.compile(fnmatch.translate(escaped)).match
             found = False
-            for t in self.types:
-                local = [u.path for u in t.unit.unknowns] + [r.path for r in t.unit.recorded]
-                local += [x.path for x in t.unit.externals] + list(t.unit.aliases)
-                for k, name in enumerate(t.names):
-                    for path in local:
-                        full = f"{name}.{path}"
-                        if not matches(full):
-                            continue
-                        found = True
-                        resolved = _channel(t, k, path, full, 1)
-                        if resolved is None:
-                            continue
-                        channel, sign = resolved
-                        key = (channel.kind, channel.a, channel.b)
-                        kept = channels.setdefault(key, channel)
-                        if kept.name != full:
-                            aliases[full] = (kept.name, sign)
+            for t, k, path in self._matching(pattern):
+                found = True
+                full = f"{t.names[k]}.{path}"
+                resolved = _channel(t, k, path, full, 1)
+                if resolved is None:
+                    continue
+                channel, sign = resolved
+                key = (channel.kind, channel.a, channel.b)
+                kept = channels.setdefault(key, channel)
+                if kept.name != full:
+                    aliases[full] = (kept.name, sign)
             if not found:
                 raise GustformError(
                     "GF2011", f"no variable matches {pattern!r}", hint=suggest(pattern, self._some_names())
                 )
         return list(channels.values()), aliases
+
+    def _matching(self, pattern: str) -> Iterator[tuple[LinkedType, int, str]]:
+        """(type, instance number, path) of the variables whose name matches. A pattern that begins with the full name
+        of an instance looks at that one only: a farm's channels by name must not cost their number squared."""
+        head = pattern.partition(".")[0]
+        if head in self.index_of:
+            number, k = self.index_of[head]
+            candidates: list[tuple[LinkedType, Sequence[int]]] = [(self.types[number], [k])]
+        else:
+            candidates = [(t, range(len(t.names))) for t in self.types]
+        # Square brackets are instance numbers here, not character classes.
+        escaped = pattern.replace("[", "\0").replace("]", "[]]").replace("\0", "[[]")
+        matches = re.compile(fnmatch.translate(escaped)).match
+        for t, instances in candidates:
+            unit = t.unit
+            local = [u.path for u in unit.unknowns] + [r.path for r in unit.recorded]
+            local += [x.path for x in unit.externals] + list(unit.aliases)
+            for k in instances:
+                name = t.names[k]
+                for path in local:
+                    if matches(f"{name}.{path}"):
+                        yield t, k, path
 
     def _some_names(self) -> list[str]:
         return [

@@ -121,10 +121,12 @@ class CasadiIdas:
             "calc_ic": True,
         }
         if jit:
+            # gcc's time grows faster than the code; -O2 is out of reach at a hundred turbines.
+            level = "-O2" if table.n_unknowns < 500 else "-O1"
             options |= {
                 "jit": True,
                 "compiler": "shell",
-                "jit_options": {"flags": ["-O2", "-march=native"], "verbose": False},
+                "jit_options": {"flags": [level, "-march=native"], "verbose": False},
             }
         self.pieces = [c[0] for c in self.flat.changes if c[0] < until]
         edges = [0.0, *sorted(set(self.pieces)), until]
