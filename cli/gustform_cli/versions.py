@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import platform
 
 import casadi
@@ -13,22 +12,12 @@ import gustform
 
 def versions() -> dict[str, str]:
     """Versions of everything that numbers depend on."""
+    from gustform_runtime import solver_versions
+
     return {
         "gustform": gustform.__version__,
         "casadi": casadi.CasadiMeta.version(),
-        "sundials": _sundials(),
+        **solver_versions(),
         "numpy": np.__version__,
         "python": platform.python_version(),
     }
-
-
-def _sundials() -> str:
-    """The version of the SUNDIALS that the runtime is linked to, from the library itself."""
-    from gustform_runtime import library_path
-
-    text = ctypes.create_string_buffer(32)
-    try:
-        ctypes.CDLL(str(library_path())).SUNDIALSGetVersion(text, len(text))
-    except (OSError, AttributeError):
-        return "unknown"
-    return text.value.decode(errors="replace")

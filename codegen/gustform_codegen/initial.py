@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from gustform.language.errors import GustformError
 from gustform_codegen.evaluate import Array, TypeEvaluator
-from gustform_codegen.link import Linked
+from gustform_codegen.link import Linked, LinkedType
 from gustform_codegen.table import SystemTable
 
 _ACCEPT = 1e-7  # largest scaled residual that still counts as solved
@@ -245,6 +245,8 @@ class _Jacobian(ca.Callback):
 
 def steady_state(linked: Linked, max_iterations: int = 300) -> SteadyState:
     """Solve for the steady state; GF5001 with the worst rows and the bounds that are hit when there is none."""
+    for t in linked.types:
+        _refuse_computed_from_free(t)
     problem = _Problem(linked)
     if problem.n_rows != problem.n_columns - len(problem.fixed):
         raise GustformError(
@@ -295,6 +297,26 @@ def steady_state(linked: Linked, max_iterations: int = 300) -> SteadyState:
     if not np.isfinite(largest) or largest > _ACCEPT:
         _report_failure(problem, solution, left, str(solver.stats()["return_status"]))
     return _in_place(linked, problem, solution, int(solver.stats()["iter_count"]), largest)
+
+
+def _refuse_computed_from_free(t: LinkedType) -> None:
+    """GF5003 if a parameter is computed from a free one: it would keep the value from before the start."""
+    component = t.components[0]
+    before = component.parameter_values()
+    for index in t.unit.free_parameters:
+        path = t.unit.parameters[index].path
+        step = 1e-6 * max(abs(before[path]), 1.0)
+        try:
+            after = component.with_value(path, before[path] + step).parameter_values()
+        except GustformError:  # beyond its bound
+            after = component.with_value(path, before[path] - step).parameter_values()
+        dependent = [other for other in before if other != path and after[other] != before[other]]
+        if dependent:
+            raise GustformError(
+                "GF5003",
+                f"{t.unit.name}: {dependent[0]} is computed from {path}, which only the start determines",
+                hint=f"a variable with an equation instead of the parameter {dependent[0]}",
+            )
 
 
 def _in_place(linked: Linked, problem: _Problem, x: Array, iterations: int, largest: float) -> SteadyState:

@@ -5,8 +5,9 @@ set(KLU_LIBRARIES "")
 set(_klu_variables "")
 foreach(_name klu amd colamd btf suitesparseconfig)
   set(_names ${_name})
-  if(GUSTFORM_STATIC_SOLVERS)
-    # The static one first; of each name the shared one if there is no other.
+  if(GUSTFORM_STATIC_SOLVERS AND NOT _name STREQUAL suitesparseconfig)
+    # The static one first; of each name the shared one if there is no other. From SuiteSparse 7 on, the static
+    # suitesparseconfig would ask for OpenMP.
     set(_names lib${_name}.a ${_name})
   endif()
   find_library(KLU_${_name}_LIBRARY NAMES ${_names})

@@ -5,7 +5,7 @@ Knows numpy and ctypes only; what a model means is none of its business.
 
 from gustform_runtime.errors import RunError, Status
 from gustform_runtime.locate import gust_run_path, include_dir, library_path
-from gustform_runtime.simulation import Option, Simulation
+from gustform_runtime.simulation import Option, Simulation, solver_versions
 
 __all__ = [
     "Option",
@@ -15,4 +15,5 @@ __all__ = [
     "gust_run_path",
     "include_dir",
     "library_path",
+    "solver_versions",
 ]

@@ -53,6 +53,8 @@ _SIGNATURES: dict[str, tuple[type | None, tuple[type, ...]]] = {
     "gust_status_text": (c_char_p, (c_int,)),
     "gust_status_name": (c_char_p, (c_int,)),
     "gust_status_list": (c_int, (c_int,)),
+    "gust_sundials_version": (c_char_p, ()),
+    "gust_klu_version": (c_char_p, ()),
     "gust_option_list": (POINTER(OptionInfo), (c_int,)),
     "gust_model_load": (c_int, (c_char_p, POINTER(_HANDLE), c_char_p, c_size_t)),
     "gust_model_parse": (c_int, (c_char_p, c_size_t, POINTER(_HANDLE), c_char_p, c_size_t)),

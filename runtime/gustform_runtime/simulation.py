@@ -33,6 +33,15 @@ def _address(array: NDArray[Any]) -> ctypes.c_void_p:
     return ctypes.c_void_p(array.ctypes.data)
 
 
+def solver_versions() -> dict[str, str]:
+    """Versions of the solvers that the runtime is built with."""
+    loaded = library()
+    return {
+        "sundials": loaded.gust_sundials_version().decode(),
+        "klu": loaded.gust_klu_version().decode(),
+    }
+
+
 class Simulation:
     """A model table and its run.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import re
 import shutil
 import subprocess
@@ -116,11 +117,11 @@ def test_declares_units_and_sentences(name: str) -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_docstring_names_equations_and_source(name: str) -> None:
     kind = component_types()[name]
-    text = kind.__doc__ or ""
+    text = inspect.getdoc(kind) or ""
     if name not in ("Bus", "StiffFrame"):
         assert "Source" in text, f"{name}: where do the equations come from?"
     assert re.search(r"\bpu\b|SI units|[Bb]ase", text), f"{name}: in which units or bases?"
-    assert re.search(r"^ {8}\S", text, re.MULTILINE), f"{name}: no equation or sketch in the docstring"
+    assert re.search(r"^ {4}\S", text, re.MULTILINE), f"{name}: no equation or sketch in the docstring"
 
 
 @pytest.mark.parametrize("name", NAMES)

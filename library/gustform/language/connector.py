@@ -86,6 +86,10 @@ class Connector:
         refuse_assignment(instance, self.name)
 
 
+class _NoQuantityError(GustformError, AttributeError):
+    """An AttributeError too, as hasattr() expects of any object."""
+
+
 class Port:
     """A port inside `equations()`: its potentials and flows as attributes."""
 
@@ -100,7 +104,7 @@ class Port:
         try:
             return self.symbols[name]
         except KeyError:
-            raise GustformError(
+            raise _NoQuantityError(
                 "GF1006",
                 f"connector {type(self.connector).__name__} has no quantity {name!r} (port {self.path})",
                 hint=" or ".join(self.symbols),

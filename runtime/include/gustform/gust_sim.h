@@ -120,6 +120,10 @@ GUST_API gust_status gust_sim_residual(gust_sim *sim, double t, const double *y,
 GUST_API gust_status gust_sim_jacobian(gust_sim *sim, double t, const double *y, const double *yp, double cj,
                                        double *values);
 
+/* Versions of the solvers in this library, "6.4.1"; never to be freed. */
+GUST_API const char *gust_sundials_version(void);
+GUST_API const char *gust_klu_version(void);
+
 #ifdef __cplusplus
 }
 #endif

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gustform.interfaces import DcPort
-from gustform.language import Component, GustformError, Input, Output, Parameter, Table, Variable, table2
+from gustform.language import Component, GustformError, Input, Output, Parameter, Table, Variable, quantity, table2
 from gustform.language.system import Constant, Series, System
 from gustform.language.table import TableData
 from gustform_codegen.build import build
@@ -313,3 +313,20 @@ def test_a_start_outside_the_domain_of_an_equation_does_not_crash(cache: KernelC
             self.eq(self.T * self.der(self.x), 1 - ca.log(self.x))
 
     assert "it: T * der(x) = 1 - log(x)" in failure(lone(Logarithm()), cache)
+
+
+def test_a_parameter_computed_from_a_free_one_is_refused(cache: KernelCache) -> None:
+    class Computed(Component):
+        P = Parameter("1", "found at the start", free=True, start=1.0)
+        Q = Parameter("1", "twice P", default=lambda self: 2.0 * self.P)
+        x = Variable("1", "state", start=1.0)
+
+        def equations(self) -> None:
+            self.eq(self.der(self.x) * quantity(1.0, "s"), self.P - self.x + self.Q)
+            self.initial(self.x, 5.0)
+
+    system = System()
+    system.add("one", Computed())
+    with pytest.raises(GustformError, match="Q is computed from P") as caught:
+        steady_state(build(system, cache).linked)
+    assert caught.value.code == "GF5003"
