@@ -1,13 +1,19 @@
 # KLU of SuiteSparse with the libraries it stands on, as target KLU::KLU. Distributions install no CMake files for it.
 find_path(KLU_INCLUDE_DIR klu.h PATH_SUFFIXES suitesparse)
 
+set(_suitesparse 0)
+if(KLU_INCLUDE_DIR AND EXISTS "${KLU_INCLUDE_DIR}/SuiteSparse_config.h")
+  file(STRINGS "${KLU_INCLUDE_DIR}/SuiteSparse_config.h" _line REGEX "^#define +SUITESPARSE_MAIN_VERSION +[0-9]+")
+  string(REGEX MATCH "[0-9]+$" _suitesparse "${_line}")
+endif()
+
 set(KLU_LIBRARIES "")
 set(_klu_variables "")
 foreach(_name klu amd colamd btf suitesparseconfig)
   set(_names ${_name})
-  if(GUSTFORM_STATIC_SOLVERS AND NOT _name STREQUAL suitesparseconfig)
+  if(GUSTFORM_STATIC_SOLVERS AND NOT (_name STREQUAL suitesparseconfig AND _suitesparse VERSION_GREATER_EQUAL 7))
     # The static one first; of each name the shared one if there is no other. From SuiteSparse 7 on, the static
-    # suitesparseconfig would ask for OpenMP.
+    # suitesparseconfig asks for OpenMP; before, its data must not lie in another library.
     set(_names lib${_name}.a ${_name})
   endif()
   find_library(KLU_${_name}_LIBRARY NAMES ${_names})
