@@ -76,7 +76,7 @@ static int iterate(gust_newton *newton, const step_data *step, N_Vector correcti
         if (iteration == 0) {
             norm_before = norm;
             if (norm <= NEGLIGIBLE * tolerance) {
-                return SUN_NLS_SUCCESS;
+                return GUST_NONLINEAR_SOLVED;
             }
         } else {
             const double ratio = norm / norm_before;
@@ -87,7 +87,7 @@ static int iterate(gust_newton *newton, const step_data *step, N_Vector correcti
             newton->contraction = rate / (1.0 - rate);
         }
         if (newton->contraction * norm <= tolerance) {
-            return SUN_NLS_SUCCESS;
+            return GUST_NONLINEAR_SOLVED;
         }
         if (iteration + 1 >= newton->most_iterations) {
             return SUN_NLS_CONV_RECVR;
@@ -125,7 +125,7 @@ static int newton_solve(SUNNonlinearSolver solver, N_Vector unused, N_Vector cor
     newton->failures = 0;
     if (IDAGetNonlinearSystemData(ida, &step.t, &step.y_predicted, &step.yp_predicted, &step.y, &step.yp,
                                   &step.residual, &step.cj, &user_data) != IDA_SUCCESS) {
-        return SUN_NLS_MEM_NULL;
+        return GUST_NONLINEAR_LOST;
     }
     if (step.cj != newton->last_cj) {
         newton->contraction = STALE_CONTRACTION;
@@ -136,11 +136,11 @@ static int newton_solve(SUNNonlinearSolver solver, N_Vector unused, N_Vector cor
         if (newton->residual(step.t, step.y_predicted, step.yp_predicted, step.residual, user_data) != 0) {
             return IDA_RES_FAIL;
         }
-        int result = renewed ? renew(newton, &step, bad, ida, user_data) : SUN_NLS_SUCCESS;
-        if (result == SUN_NLS_SUCCESS) {
+        int result = renewed ? renew(newton, &step, bad, ida, user_data) : GUST_NONLINEAR_SOLVED;
+        if (result == GUST_NONLINEAR_SOLVED) {
             result = iterate(newton, &step, correction, weights, tolerance, user_data);
         }
-        if (result == SUN_NLS_SUCCESS) {
+        if (result == GUST_NONLINEAR_SOLVED) {
             return result;
         }
         ++newton->failures;

@@ -43,8 +43,12 @@
 /* Renamed in 7, where errors of packages joined the common error codes. */
 #if SUNDIALS_VERSION_MAJOR >= 7
 #define GUST_LINEAR_SOLVER_LOST SUN_ERR_EXT_FAIL
+#define GUST_NONLINEAR_SOLVED   SUN_SUCCESS
+#define GUST_NONLINEAR_LOST     SUN_ERR_EXT_FAIL
 #else
 #define GUST_LINEAR_SOLVER_LOST SUNLS_PACKAGE_FAIL_UNREC
+#define GUST_NONLINEAR_SOLVED   SUN_NLS_SUCCESS
+#define GUST_NONLINEAR_LOST     SUN_NLS_MEM_NULL
 #endif
 
 #endif

@@ -4,7 +4,7 @@
 #include "gustform/gust_sim.h"
 
 #define TEXT_OF(number) #number
-#define TEXT(number) TEXT_OF(number)
+#define TEXT(number)    TEXT_OF(number)
 
 const char *gust_sundials_version(void)
 {
