@@ -45,14 +45,15 @@ static double correct(N_Vector correction, N_Vector delta, double factor, bool f
     const gust_lanes *d = gust_lanes_in(gust_vector_data(delta));
     const gust_lanes *w = gust_lanes_in(gust_vector_data(weights));
     gust_lanes *sum = gust_lanes_of(gust_vector_data(correction));
+    /* Not a product of the sum with 0: a number lost in an earlier attempt must not come back. */
+    const gust_lanes nothing = {0.0};
     gust_lanes square[GUST_BLOCK_LANES] = {{0.0}};
     for (int64_t i = 0; i < n; i += GUST_BLOCK_LANES) {
         for (int k = 0; k < GUST_BLOCK_LANES; ++k) {
             const gust_lanes change = factor * d[i + k];
             const gust_lanes term = change * w[i + k];
             square[k] += term * term;
-            /* Not a product with 0: a number lost in an earlier attempt must not come back. */
-            sum[i + k] = first ? change : sum[i + k] + change;
+            sum[i + k] = change + (first ? nothing : sum[i + k]);
         }
     }
     return sqrt(gust_lane_sum(square) / (double)gust_vector_length(correction));
