@@ -5,7 +5,6 @@ Both get the flat system, the same start values, tolerances, wind samples and lo
 
 from __future__ import annotations
 
-import itertools
 import subprocess
 import time
 from dataclasses import dataclass
@@ -95,8 +94,17 @@ class CasadiIdas:
     """CasADi's idas on the same equations, with the wind as a linear interpolant of time."""
 
     def __init__(
-        self, linked: Linked, table: SystemTable, wind: Wind, until: float, rtol: float, atol: float, *, jit: bool
+        self,
+        linked: Linked,
+        table: SystemTable,
+        wind: Wind,
+        until: float,
+        rtol: float,
+        atol: float,
+        *,
+        jit: int | None = None,
     ) -> None:
+        """`jit` is the time that the C compiler gets, s; it raises TimeoutError when that is not enough."""
         self.table = table
         begin = time.perf_counter()
         self.flat = flatten_system(linked, table)
@@ -112,7 +120,8 @@ class CasadiIdas:
             "wind", "linear", [grid.tolist()], wind.value.ravel().tolist(), {"lookup_mode": ["exact"]}
         )
         ode, alg = right(x, z, speed(t), changing)
-        problem = {"x": x, "z": z, "t": t, "p": changing, "ode": ode, "alg": alg}
+        # `u` is constant between the points of the grid: one integrator, and one compilation, for all of the run.
+        problem = {"x": x, "z": z, "t": t, "u": changing, "ode": ode, "alg": alg}
         options: dict[str, Any] = {
             "reltol": rtol,
             "abstol": atol,
@@ -126,13 +135,15 @@ class CasadiIdas:
             options |= {
                 "jit": True,
                 "compiler": "shell",
-                "jit_options": {"flags": [level, "-march=native"], "verbose": False},
+                "jit_options": {"compiler": f"timeout {jit} gcc", "flags": [level, "-march=native"]},
             }
-        self.pieces = [c[0] for c in self.flat.changes if c[0] < until]
-        edges = [0.0, *sorted(set(self.pieces)), until]
-        self.integrators = [
-            (a, b, ca.integrator("peer", "idas", problem, a, b, options)) for a, b in itertools.pairwise(edges)
-        ]
+        self.edges = [0.0, *sorted({at for at, _, _ in self.flat.changes if at < until}), until]
+        try:
+            self.integrator = ca.integrator("peer", "idas", problem, 0.0, self.edges[1:], options)
+        except RuntimeError as error:
+            if jit and time.perf_counter() - begin > jit:
+                raise TimeoutError(f"CasADi's C code did not compile within {jit} s") from error
+            raise
         self.build_seconds = time.perf_counter() - begin
 
     def run(self) -> Measured:
@@ -140,18 +151,18 @@ class CasadiIdas:
         s = self.s
         nominal = self.table.nominal
         start = self.table.start / nominal
-        x, z = start[s.x_index], start[s.z_index]
-        changing = list(self.flat.changing_start)
-        steps = 0
-        begin = time.perf_counter()
-        for a, _, integrator in self.integrators:
+        changing, columns = list(self.flat.changing_start), []
+        for a in self.edges[:-1]:
             for at, index, value in self.flat.changes:
                 if at == a:
                     changing[index] = value
-            result = integrator(x0=x, z0=z, p=changing)
-            x, z = np.asarray(result["xf"]).ravel(), np.asarray(result["zf"]).ravel()
-            steps += int(integrator.stats().get("nsteps", 0))
+            columns.append(list(changing))
+        u = np.array(columns).T
+        begin = time.perf_counter()
+        result = self.integrator(x0=start[s.x_index], z0=start[s.z_index], u=u)
         seconds = time.perf_counter() - begin
+        steps = int(self.integrator.stats().get("nsteps", 0))
+        x, z = np.asarray(result["xf"])[:, -1], np.asarray(result["zf"])[:, -1]
         final = np.zeros(self.table.n_unknowns)
         final[s.x_index], final[s.z_index] = x, z
         return Measured(self.build_seconds, seconds, steps, final * nominal)
