@@ -1,4 +1,4 @@
-"""The command `gustform`: simulate, check, info, plot, new.
+"""The command `gustform`: simulate, check, linearise, design, study, info, plot, new.
 
 Only what a command needs is loaded when it runs; `gustform --help` loads none of it. Exit codes: 0 done, 1 the model
 or the run failed, 2 usage or scenario, 130 interrupted.
@@ -8,17 +8,13 @@ from __future__ import annotations
 
 import io
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-DONE, FAILED, USAGE, INTERRUPTED = 0, 1, 2, 130
-
-# Codes of what the caller can mend on the command line or in the scenario: the exit code is then 2.
-_USAGE_CODES = ("GF2", "GF7001", "GF7002", "GF7003")
+from gustform_cli.exits import DONE, FAILED, INTERRUPTED, USAGE, guarded
+from gustform_cli.study.app import study
 
 app = typer.Typer(
     name="gustform",
@@ -28,6 +24,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
+app.add_typer(study)
 
 Scenario = Annotated[Path, typer.Argument(metavar="SCENARIO.yaml", help="scenario file; `gustform new` writes one")]
 Overrides = Annotated[
@@ -48,7 +45,7 @@ def simulate(
     """Run a scenario; writes result.nc, summary.json and figure.png."""
     from gustform_cli.interrupt import Interrupt
 
-    with Interrupt() as interrupt, _errors():
+    with Interrupt() as interrupt, guarded():
         from gustform_cli.simulate import simulate as run
 
         folder = out if out is not None else Path("results") / scenario.stem
@@ -72,7 +69,7 @@ def check(
     ] = None,
 ) -> None:
     """Everything up to the linked model, no run: prints the model report."""
-    with _errors():
+    with guarded():
         from gustform_cli.model import link, load
         from gustform_cli.model_report import as_json, as_text
         from gustform_codegen.report import model_report
@@ -91,7 +88,7 @@ def info(
     name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="component type; all are listed without")] = None,
 ) -> None:
     """Components and their parameters, from the declarations."""
-    with _errors():
+    with guarded():
         from gustform_cli.info import describe, overview
 
         print(overview() if name is None else describe(name))
@@ -103,7 +100,7 @@ def plot(
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="figure file [beside the result]")] = None,
 ) -> None:
     """Draw the figure of a run again, from its result file."""
-    with _errors():
+    with guarded():
         from gustform_cli.figures import draw
 
         print(draw(result, out if out is not None else result.parent / "figure.png"))
@@ -114,7 +111,7 @@ def new(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="scenario file to write")],
 ) -> None:
     """Write a commented scenario to start from; never overwrites."""
-    with _errors():
+    with guarded():
         from gustform_cli.new import write
 
         print(write(file))
@@ -134,30 +131,6 @@ def options(
     if context.invoked_subcommand is None:
         print(context.get_help())
         raise typer.Exit(USAGE)
-
-
-@contextmanager
-def _errors() -> Iterator[None]:
-    """Turn errors of ours into lines on stderr and an exit code; anything else is a defect and keeps its traceback."""
-    from gustform.language.errors import GustformError
-    from gustform_cli.errors import ErrorList
-
-    try:
-        yield
-    except ErrorList as several:
-        for error in several.errors:
-            print(error, file=sys.stderr)
-        raise typer.Exit(max(_exit_code(error) for error in several.errors)) from None
-    except GustformError as error:
-        print(error, file=sys.stderr)
-        raise typer.Exit(_exit_code(error)) from None
-    except KeyboardInterrupt:
-        print("gustform: interrupted", file=sys.stderr)
-        raise typer.Exit(INTERRUPTED) from None
-
-
-def _exit_code(error: object) -> int:
-    return USAGE if str(getattr(error, "code", "")).startswith(_USAGE_CODES) else FAILED
 
 
 def main() -> None:

@@ -1,0 +1,1 @@
+"""Studies: several cases or many operating points, with figures and tables, by one command each."""
