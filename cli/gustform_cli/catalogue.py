@@ -16,9 +16,10 @@ def part_types() -> dict[str, type[Component]]:
     waiting = [unit.kind for unit in UNITS.values()] + list(found.values())
     while waiting:
         for part in waiting.pop().declared(Part).values():
-            if part.kind.__name__ not in found:
-                found[part.kind.__name__] = part.kind
-                waiting.append(part.kind)
+            for kind in part.among:
+                if kind.__name__ not in found:
+                    found[kind.__name__] = kind
+                    waiting.append(kind)
     return dict(sorted(found.items()))
 
 
@@ -30,8 +31,9 @@ def all_types() -> dict[str, type[Component]]:
 def choices(part: Part) -> list[str]:
     """The types that may stand in the place of a part, its own first; short names left out."""
     if part.base is None:
-        return [part.kind.__name__]
-    names = [name for name in fitting_parts(part) if name not in ALIASES]
+        return [kind.__name__ for kind in part.among]
+    own = {kind.__name__ for kind in part.among}
+    names = own | {name for name in fitting_parts(part) if name not in ALIASES}
     return sorted(names, key=lambda name: (name != part.kind.__name__, name))
 
 

@@ -6,7 +6,7 @@ declared unit and checked against the declared range here, where its line in the
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -57,7 +57,7 @@ class Reader:
         if aggregate == "turbines" or (type(aggregate) is int and aggregate >= 1):
             given["aggregate"] = self.many(aggregate, (*path, "aggregate"))
         # Anything else has been refused by the check of the format.
-        modifiers = self._modifiers(kind, given, path, bound=frozenset(implied), tables={})
+        modifiers = self._modifiers((kind,), given, path, bound=frozenset(implied), tables={})
         modifiers.update({key: value for key, value in implied.items() if key not in modifiers})
         if len(self.errors) > before:
             return None
@@ -135,16 +135,17 @@ class Reader:
 
     def _modifiers(
         self,
-        kind: type[Component],
+        kinds: Sequence[type[Component]],
         given: Mapping[str, Any],
         path: NodePath,
         *,
         bound: frozenset[str],
         tables: Mapping[str, TableReader],
     ) -> dict[str, Any]:
-        """Constructor arguments of a type from the keys of its entry. `bound` are set elsewhere already."""
+        """Constructor arguments of a type, or of one of several, from the keys of its entry. `bound` are set elsewhere
+        already."""
         modifiers: dict[str, Any] = {}
-        declarations = kind.declarations()
+        declarations = {name: value for kind in reversed(kinds) for name, value in kind.declarations().items()}
         for key, value in given.items():
             declaration = declarations.get(key)
             where = (*path, key)
@@ -160,8 +161,8 @@ class Reader:
                 self._fail(
                     "GF2402",
                     where,
-                    f"{label} must not be here: {kind.__name__} has no parameter {key!r}",
-                    did_you_mean(key, [*kind.parameter_names(), *keys]),
+                    f"{label} must not be here: {kinds[0].__name__} has no parameter {key!r}",
+                    did_you_mean(key, [*(name for kind in kinds for name in kind.parameter_names()), *keys]),
                     key=True,
                 )
         for name, needed in declarations.items():
@@ -198,10 +199,14 @@ class Reader:
             return None
         keys = {key: item for key, item in entry.items() if key != "type"}
         before = len(self.errors)
-        modifiers = self._modifiers(found.kind, keys, path, bound=frozenset(part.modifiers), tables=found.tables)
+        open_kind = part.select is not None and not entry.get("type")  # the owner chooses; it knows which keys fit
+        kinds = part.among if open_kind else (found.kind,)
+        modifiers = self._modifiers(kinds, keys, path, bound=frozenset(part.modifiers), tables=found.tables)
         if len(self.errors) > before:
             return None
-        return modifiers if found.kind is part.kind else self._guarded(lambda: found.kind(**modifiers), path)
+        if open_kind or (found.kind is part.kind and part.select is None):
+            return modifiers
+        return self._guarded(lambda: found.kind(**modifiers), path)
 
     def _replacement(self, part: Part, name: str | None, path: NodePath) -> Replacement | None:
         """What stands in the place of a part: what the entry names, or what the part is by itself."""

@@ -101,6 +101,8 @@ def _parameter_schema(parameter: Parameter) -> dict[str, Any]:
     description = f"{parameter.description} [{'; '.join(note for note in notes if note)}]"
     if parameter.structural and isinstance(parameter.default, bool):
         return {"type": "boolean", "description": description}
+    if parameter.choices:
+        return {"enum": list(parameter.choices), "description": description}
     if parameter.structural and isinstance(parameter.default, str):
         return {"type": "string", "description": description}
     if not is_plain(parameter.unit):

@@ -104,11 +104,12 @@ def find_part(name: str, place: Part) -> Replacement:
     """The component of that name for the place of a part; GF2012 if there is none, GF1007 if it does not fit."""
     wanted = ALIASES.get(name, name)
     base = place.base or place.kind
-    if wanted not in PARTS and wanted != place.kind.__name__:
+    own = {kind.__name__: kind for kind in place.among}
+    if wanted not in PARTS and wanted not in own:
         raise GustformError(
             "GF2012", f"there is no {base.__name__} of type {name!r}", hint=suggest(name, fitting_parts(place))
         )
-    found = PARTS.get(wanted, Replacement(place.kind))
+    found = PARTS[wanted] if wanted in PARTS else Replacement(own[wanted])
     if not issubclass(found.kind, base):
         raise GustformError(
             "GF1007",

@@ -163,7 +163,7 @@ class Component:
             if isinstance(given, Component):
                 child = type(given)(**given._modifiers)
             else:
-                child = declaration.kind(**given)
+                child = declaration.chosen(self)(**given)
             usable = type(child).declarations()
             for key, value in declaration.modifiers.items():
                 if key in usable:
@@ -248,7 +248,7 @@ class Component:
             modifiers[head] = value
         else:
             given = modifiers.get(head, {})
-            child = given if isinstance(given, Component) else self._declarations[head].kind(**given)  # type: ignore[union-attr]
+            child = given if isinstance(given, Component) else type(self.part(head))(**given)
             modifiers[head] = child.with_value(rest, value)
         return type(self)(**modifiers)
 

@@ -7,7 +7,7 @@ number (parameters) or the sub-component (parts); read inside `equations()` it g
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from numbers import Real
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -63,8 +63,8 @@ class Parameter(Declaration):
 
     `default` is a number or a function of the component; without one the user must give a value. `min`, `max` are
     inclusive, `above` is an exclusive lower bound. `structural=True`: the value shapes the equations, so another
-    value makes another type (and a compilation). `free=True`: the value is found by the steady-state start, from
-    `start`, through an `initial()` equation.
+    value makes another type (and a compilation); a word among `choices`, if there are any. `free=True`: the value is
+    found by the steady-state start, from `start`, through an `initial()` equation.
     """
 
     def __init__(
@@ -77,11 +77,13 @@ class Parameter(Declaration):
         max: float | None = None,
         above: float | None = None,
         structural: bool = False,
+        choices: Sequence[str] = (),
         free: bool = False,
         start: Value | None = None,
     ) -> None:
         super().__init__(unit, description)
         self.default = default
+        self.choices = tuple(choices)
         self.min = min
         self.max = max
         self.above = above
@@ -93,6 +95,12 @@ class Parameter(Declaration):
 
     def check(self, value: Any, path: str) -> Any:
         """The value, or GF2002/GF2003 with the path, the bound and something to try."""
+        if self.choices and value not in self.choices:
+            raise GustformError(
+                "GF2003",
+                f"{path} must be {' or '.join(self.choices)} ({self.description}); got {value!r}",
+                hint=str(self.default),
+            )
         if self.structural and not isinstance(value, int | float):
             return value
         if isinstance(value, bool) and self.structural:
@@ -187,21 +195,37 @@ class Table(Declaration):
 class Part:
     """A sub-component. Modifiers are numbers, or functions of the parent's parameters (kept symbolic).
 
-    With `base`, a user may put another component in its place, provided it is a `base`.
+    With `base`, a user may put another component in its place, provided it is a `base`. With `select`, the component
+    itself chooses what stands there unless the user does: a function of its structural parameters and its other parts
+    that gives one of `among` (which `kind` is one of).
     """
 
     name: str = ""
 
     def __init__(
-        self, kind: type[Component], description: str, *, base: type[Component] | None = None, **modifiers: Any
+        self,
+        kind: type[Component],
+        description: str,
+        *,
+        base: type[Component] | None = None,
+        select: Callable[[Any], type[Component]] | None = None,
+        among: Sequence[type[Component]] = (),
+        **modifiers: Any,
     ) -> None:
         self.kind = kind
         self.description = description
         self.base = base
+        self.select = select
+        self.among: tuple[type[Component], ...] = tuple(dict.fromkeys((kind, *among)))
         self.modifiers = modifiers
-        unknown = set(modifiers) - set(kind.declarations())
+        usable = {name for one in self.among for name in one.declarations()}
+        unknown = set(modifiers) - usable
         if unknown:
             raise GustformError("GF1004", f"{kind.__name__} has no parameter {sorted(unknown)[0]!r}")
+
+    def chosen(self, owner: Component) -> type[Component]:
+        """What stands in this place of `owner` where the user says nothing."""
+        return self.kind if self.select is None else self.select(owner)
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name

@@ -311,3 +311,44 @@ def test_inheritance_of_declarations_and_override() -> None:
     assert list(HeavyRotor.declarations()) == ["R", "J", "w", "rim"]
     assert Lighter(R=1.0).J == 0.5
     assert Rotor(R=1.0).J == 1.0
+
+
+class _Plain(Component):
+    """One of two."""
+
+    gain = Parameter("1", "gain", default=1.0)
+
+
+class _Fancy(_Plain):
+    """The other."""
+
+    extra = Parameter("1", "something more", default=2.0)
+
+
+class _Choosing(Component):
+    """Chooses a part by a word, unless the user does."""
+
+    mode = Parameter("1", "how well", default="plain", structural=True, choices=("plain", "fancy"))
+    part_ = Part(
+        _Plain,
+        "the part",
+        base=_Plain,
+        select=lambda self: _Fancy if self.mode == "fancy" else _Plain,
+        among=(_Fancy,),
+        gain=3.0,
+    )
+
+
+def test_an_owner_chooses_its_part_by_structure() -> None:
+    assert type(_Choosing().part_) is _Plain
+    fancy = _Choosing(mode="fancy", part_={"extra": 5.0})
+    assert type(fancy.part_) is _Fancy
+    assert (fancy.part_.gain, fancy.part_.extra) == (3.0, 5.0)
+    assert fancy.structure_key() != _Choosing().structure_key()
+    assert type(_Choosing(mode="fancy", part_=_Plain()).part_) is _Plain  # the user's word counts more
+    assert fancy.with_value("part_.extra", 6.0).part_.extra == 6.0
+
+
+def test_a_word_must_be_among_the_choices() -> None:
+    with pytest.raises(GustformError, match="mode must be plain or fancy .*; got 'best'"):
+        _Choosing(mode="best")
