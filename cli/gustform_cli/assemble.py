@@ -21,9 +21,10 @@ from gustform_cli.scenario import ComponentEntry, ConstantWind, FileWind, Scenar
 from gustform_cli.wind.source import Reader as SeriesReader
 from gustform_cli.wind.source import WindSource, constant, csv_file, turbulence
 
-# The signal and the part this layer knows by name.
+# The signal, the part and the parameter this layer knows by name.
 FRAME = "frame"
 ROTOR, RADIUS = "rotor", "radius"
+FIDELITY = "fidelity"
 
 
 @dataclass
@@ -70,7 +71,8 @@ def _components(reader: Reader, listed: Mapping[str, Any], scenario: Scenario | 
         for name, entry in units.items():
             node = entry.get("at", entry.get("from"))
             if isinstance(node, str) is hanging:
-                implied = {
+                implied: dict[str, float | str] = {
+                    **_fidelity(entry["type"], scenario),
                     **_operating_wind(entry["type"], name, scenario),
                     **_voltage(entry["type"], node, made, units),
                 }
@@ -78,6 +80,12 @@ def _components(reader: Reader, listed: Mapping[str, Any], scenario: Scenario | 
                 if component is not None:
                     made[name] = component
     return {name: made[name] for name in units if name in made}
+
+
+def _fidelity(kind: str, scenario: Scenario | None) -> dict[str, str]:
+    """How finely a unit is modelled, unless its entry says otherwise, is said once for the whole scenario."""
+    known = scenario is not None and kind in UNITS and FIDELITY in UNITS[kind].kind.declared(Parameter)
+    return {FIDELITY: scenario.fidelity} if known and scenario is not None else {}
 
 
 def _operating_wind(kind: str, name: str, scenario: Scenario | None) -> dict[str, float]:

@@ -35,7 +35,7 @@ class Reader:
     turbines: int | None
     errors: list[GustformError]
 
-    def component(self, name: str, entry: Mapping[str, Any], implied: Mapping[str, float]) -> Component | None:
+    def component(self, name: str, entry: Mapping[str, Any], implied: Mapping[str, float | str]) -> Component | None:
         """The component `name`, None if there are errors in it (they are in `errors`).
 
         `implied` are parameters that follow from the rest of the scenario where the entry does not give them.

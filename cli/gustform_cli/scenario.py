@@ -98,12 +98,6 @@ Many = Annotated[
 ]
 
 
-def _check_fidelity(value: object) -> object:
-    if value in ("lossless", "dq"):
-        raise _refuse("GF2204", f" must be rms in this version; {value} is not there yet, got {value!r}", "rms")
-    return value
-
-
 class _Part(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=False)
 
@@ -205,8 +199,9 @@ class Scenario(_Part):
 
     name: StrictStr = Field(min_length=1, description="title, used in figures")
     description: StrictStr = Field("", description="free text")
-    fidelity: Annotated[Literal["rms"], BeforeValidator(_check_fidelity)] = Field(
-        "rms", description="rms: phasor network"
+    fidelity: Literal["lossless", "rms", "dq"] = Field(
+        "rms",
+        description="lossless: the paper's analysis model; rms: phasors; dq: filters, inner loops, stator",
     )
     turbines: Annotated[StrictInt, Field(ge=1, le=100_000)] | None = Field(
         None, description="number that `count: turbines` and `aggregate: turbines` refer to"

@@ -14,6 +14,7 @@ from types import MappingProxyType
 from gustform.aero.closed_form_rotor import ClosedFormRotor
 from gustform.aero.table_rotor import TableRotor, read_cp_table
 from gustform.control.dual_port import DualPort
+from gustform.control.schedule import FixedPoint
 from gustform.electrical.bus import Bus
 from gustform.electrical.constant_power_load import ConstantPowerLoad
 from gustform.electrical.line import Line
@@ -77,6 +78,7 @@ PARTS: Mapping[str, Replacement] = MappingProxyType(
     {
         "ClosedFormRotor": Replacement(ClosedFormRotor),
         "DualPort": Replacement(DualPort),
+        "FixedPoint": Replacement(FixedPoint),
         "SEXS": Replacement(SEXS),
         "TGOV1": Replacement(TGOV1),
         "TableRotor": Replacement(TableRotor, tables={"cp": read_cp_table}),

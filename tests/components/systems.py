@@ -110,6 +110,7 @@ SYSTEMS: dict[str, Callable[[], System]] = {
     "ClosedFormRotor": lambda: with_turbine(_turbine(rotor=ClosedFormRotor())),
     "ConstantPowerLoad": with_load,
     "DualPort": lambda: with_turbine(_turbine()),
+    "FixedPoint": lambda: with_turbine(_turbine()),
     "Line": with_line,
     "PmsgTurbine": lambda: with_turbine(_turbine()),
     "SEXS": with_generator,

@@ -15,19 +15,25 @@ from gustform.turbines.pmsg_turbine import PmsgTurbine
 from tests.components.evaluate import evaluate
 
 GSC = {"v_dc": 1.0, "Q": 0.0, "xi": 0.0, "Q_filtered": 0.0}
+MSC = GSC | {"omega_del": 1.16}
 
 
 @pytest.mark.parametrize(
-    ("control", "free"),
-    [(DualPortGsc(K_theta=0.5, K_d=0.0067), {"Q_ref": 0.0}), (DualPortMsc(K_theta=15.0, K_d=0.2), {"V_ref": 1.0})],
+    ("control", "at", "free"),
+    [
+        (DualPortGsc(K_theta=0.5, K_d=0.0067), GSC, {"Q_ref": 0.0}),
+        (DualPortMsc(K_theta=15.0, K_d=0.2), MSC, {"V_ref": 1.0}),
+    ],
 )
 @pytest.mark.parametrize("w", [0.1, 10.0, 500.0, 1e4])
-def test_frequency_response_is_a_filtered_pd(control: Component, free: dict[str, float], w: float) -> None:
+def test_frequency_response_is_a_filtered_pd(
+    control: Component, at: dict[str, float], free: dict[str, float], w: float
+) -> None:
     """(K + K_d s)/(T s + 1) at s = jw, from the slopes of the state equation and of the output."""
     h = 1e-3
 
     def slope(of: str, to: str) -> float:
-        up, down = (evaluate(control, GSC | {to: GSC[to] + sign * h}, free)[of] for sign in (1.0, -1.0))
+        up, down = (evaluate(control, at | {to: at[to] + sign * h}, free)[of] for sign in (1.0, -1.0))
         return (up - down) / (2.0 * h)
 
     a, b = slope("der(xi)", "xi"), slope("der(xi)", "v_dc")
@@ -86,8 +92,8 @@ def test_servo_has_a_rate_limit(error: float, rate: float) -> None:
     ],
 )
 def test_pitch_demand(omega: float, P: float, integrals: tuple[float, float], demand: float) -> None:
-    control = PitchControl(beta_del=3.0, omega_del=1.15, K_p=20.0)
-    given = {"omega_r": omega, "P": 0.5, "P_filtered": P, "servo.beta": 3.0}
+    control = PitchControl(K_p=20.0)
+    given = {"beta_del": 3.0, "omega_del": 1.15, "omega_r": omega, "P": 0.5, "P_filtered": P, "servo.beta": 3.0}
     given |= {"speed_limiter.integral": integrals[0], "power_limiter.integral": integrals[1]}
     found = evaluate(control, given)
     assert found["beta_ref"] == pytest.approx(demand, abs=1e-12)

@@ -50,7 +50,7 @@ def test_given_values_are_kept() -> None:
     mine = PmsgTurbine(wind_speed=8.0, curtailment=0.1, omega_del=1.1, K_msc=9.0)
     assert (mine.omega_del, mine.K_msc) == (1.1, 9.0)
     assert mine.drive.start_value(type(mine.drive).w) == pytest.approx(1.1 * 1.1417)
-    assert mine.control.omega_del == 1.1
+    assert mine.schedule.omega_point == 1.1
     assert mine.control.K_d_msc == pytest.approx(0.0067 * 9.0 / 0.5)
 
 

@@ -54,9 +54,8 @@ def test_residual_equals_the_reference_at_random_states(wind: float, cache: Kern
         "wt.control.gsc.Q_ref": dae.start.Q_gsc,
         "wt.control.msc.V_ref": dae.start.V_msc,
         # the operating point is compared elsewhere; here only what follows from it
-        "wt.control.msc.omega_del": dae.start.op.omega_del,
-        "wt.pitch.omega_del": dae.start.op.omega_del,
-        "wt.pitch.beta_del": dae.start.op.beta_del,
+        "wt.schedule.omega_point": dae.start.op.omega_del,
+        "wt.schedule.beta_point": dae.start.op.beta_del,
         "wt.pitch.K_p": dae.start.op.K_p,
         "wt.control.msc.K_theta": dae.start.op.K_msc,
         "wt.control.msc.K_d": ref.KD_GSC * dae.start.op.K_msc / ref.K_GSC,

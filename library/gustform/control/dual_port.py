@@ -5,7 +5,7 @@ from __future__ import annotations
 from gustform.control.converter_control import ConverterControl
 from gustform.control.dual_port_gsc import DualPortGsc
 from gustform.control.dual_port_msc import DualPortMsc
-from gustform.language import Parameter, Part
+from gustform.language import Input, Output, Parameter, Part
 
 
 class DualPort(ConverterControl):
@@ -17,13 +17,12 @@ class DualPort(ConverterControl):
         omega_gsc - 1 = K_gsc (v_dc - v_dc*),      omega_msc - omega_del = K_msc (v_dc - v_dc*)
 
     K_d_msc = K_d_gsc K_msc / K_gsc by default (the condition of the stability theorem). pu as in ConverterControl.
-    K_msc and omega_del come from the turbine's operating point; see `control.operating_point`.
+    K_msc comes from the turbine's operating point, omega_del from its schedule; see `control.operating_point`.
     Source: Lyu, Subotic, Gross 2022, IV-C, IV-D; T_dc = 0.002 s: project notes.
     """
 
     K_gsc = Parameter("pu", "droop K_theta of the grid side", default=0.5, above=0.0)
     K_msc = Parameter("pu", "droop K_theta of the machine side", default=lambda self: self.K_gsc, min=0.0)
-    omega_del = Parameter("pu", "rotor speed at the operating point, base of the rotor speed", default=1.2, above=0.0)
     K_d_gsc = Parameter("s", "derivative gain of the grid side", default=0.0067, min=0.0)
     K_d_msc = Parameter(
         "s", "derivative gain of the machine side", default=lambda self: self.K_d_gsc * self.K_msc / self.K_gsc, min=0.0
@@ -37,6 +36,13 @@ class DualPort(ConverterControl):
     frequency_reserve = Parameter(
         "pu", "largest frequency deviation the gains are designed for", default=0.01, above=0.0
     )
+
+    Q_gsc = Input("pu", "reactive power delivered by the grid-side converter")
+    Q_msc = Input("pu", "reactive power delivered by the machine-side converter")
+    omega_del = Input("pu", "rotor speed at the operating point, base of the rotor speed", start=1.2)
+    V_gsc = Output("pu", "magnitude of the grid-side voltage", start=1.0)
+    omega_msc = Output("pu", "frequency of the machine-side voltage, base of the rotor speed", start=1.2)
+    V_msc = Output("pu", "magnitude of the machine-side voltage", start=1.0)
 
     gsc = Part(
         DualPortGsc,
@@ -52,7 +58,6 @@ class DualPort(ConverterControl):
     msc = Part(
         DualPortMsc,
         "machine side",
-        omega_del=lambda self: self.omega_del,
         K_theta=lambda self: self.K_msc,
         K_d=lambda self: self.K_d_msc,
         K_q=lambda self: self.K_q_msc,
@@ -64,6 +69,7 @@ class DualPort(ConverterControl):
     def equations(self) -> None:
         self.connect(self.v_dc, self.gsc.v_dc)
         self.connect(self.v_dc, self.msc.v_dc)
+        self.connect(self.omega_del, self.msc.omega_del)
         self.connect(self.Q_gsc, self.gsc.Q)
         self.connect(self.Q_msc, self.msc.Q)
         self.connect(self.omega_gsc, self.gsc.omega)

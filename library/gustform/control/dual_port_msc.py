@@ -16,7 +16,6 @@ class DualPortMsc(Component):
     Source: Lyu, Subotic, Gross 2022, eqs. (9a), (9b) with K_q^msc (project notes).
     """
 
-    omega_del = Parameter("pu", "rotor speed at the operating point", default=1.2, above=0.0)
     K_theta = Parameter("pu", "droop of the rotor speed with the DC voltage", default=0.5, above=0.0)
     K_d = Parameter("s", "derivative gain, pu speed for 1 pu/s of DC voltage", default=0.0067, min=0.0)
     T_dc = Parameter("s", "time constant of the filter of the DC voltage", default=0.002, above=0.0)
@@ -26,6 +25,7 @@ class DualPortMsc(Component):
     Q_ref = Parameter("pu", "reactive power set point Q*", default=0.0)
     V_ref = Parameter("pu", "voltage set point V*, found at the start", free=True, start=0.95)
 
+    omega_del = Input("pu", "rotor speed at the operating point", start=1.2)
     v_dc = Input("pu", "DC voltage", start=1.0)
     Q = Input("pu", "reactive power delivered to the machine")
     omega = Output("pu", "frequency of the converter's voltage, base of the rotor speed", start=1.2)

@@ -19,18 +19,19 @@ class PitchControl(Component):
     Source: Lyu, Subotic, Gross 2022, eq. (11), Fig. 7; gains of the limiters: project notes.
     """
 
-    beta_del = Parameter("deg", "pitch angle at the operating point", default=0.0, min=0.0)
-    omega_del = Parameter("pu", "rotor speed at the operating point", default=1.2, above=0.0)
     K_p = Parameter("deg", "pitch for speed, deg/pu", default=0.0, min=0.0)
     beta_min = Parameter("deg", "lowest pitch demand", default=0.0)
     omega_max = Parameter("pu", "speed above which the speed limiter acts", default=1.2, above=0.0)
     P_max = Parameter("pu", "power above which the power limiter acts", default=1.0, above=0.0)
+    beta_start = Parameter("deg", "first guess of the pitch angle", default=0.0)
     T_P = Parameter("s", "time constant of the filter of the power", default=0.5, above=0.0)
 
     speed_limiter = Part(PiLimiter, "limits the rotor speed", x_max=lambda self: self.omega_max, k_p=60.0, k_i=12.0)
     power_limiter = Part(PiLimiter, "limits the power", x_max=lambda self: self.P_max, k_p=1.0, k_i=2.0)
-    servo = Part(PitchServo, "pitch actuator", beta=lambda self: self.beta_del)
+    servo = Part(PitchServo, "pitch actuator", beta=lambda self: self.beta_start)
 
+    beta_del = Input("deg", "pitch angle at the operating point", nominal=10.0)
+    omega_del = Input("pu", "rotor speed at the operating point", start=1.2)
     omega_r = Input("pu", "rotor speed", start=1.2)
     P = Input("pu", "active power taken from the machine", start=0.5)
     beta = Output("deg", "pitch angle", nominal=10.0)

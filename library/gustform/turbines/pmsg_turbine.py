@@ -15,24 +15,29 @@ from gustform.control.operating_point import (
     power_at,
 )
 from gustform.control.pitch import PitchControl
+from gustform.control.schedule import FixedPoint, OperatingSchedule
 from gustform.conventions import NOMINAL_FREQUENCY, active_power, reactive_power
 from gustform.electrical.dc_link import DcLink
+from gustform.electrical.grid_side import GridSide
 from gustform.electrical.gsc import GridSideConverter
 from gustform.electrical.line import Line
+from gustform.electrical.machine_side import MachineSide
 from gustform.electrical.msc import MachineSideConverter
 from gustform.electrical.parallel_units import ParallelUnits
+from gustform.electrical.permanent_magnet import PermanentMagnetMachine
 from gustform.electrical.pmsg import Pmsg
 from gustform.electrical.transformer import Transformer
 from gustform.interfaces import AcPort
 from gustform.language import Component, Input, Output, Parameter, Part, Variable
 from gustform.mechanical.one_mass import OneMass
+from gustform.turbines import stages
 
 
 class PmsgTurbine(Component):
     """PMSG wind turbine with grid-forming control, or `aggregate` identical ones.
 
         wind -> rotor -- drive train -- PMSG -- MSC -- DC link -- GSC -- transformer -- line -- grid
-                  ^ pitch control                  \\--- control ---/
+                  ^ pitch control                  \\--- control ---/        ^ schedule: operating point
 
     Everything inside is one turbine; its currents are multiplied by `aggregate` at the grid port. pu: base `rating` of
     one turbine, `omega_base` for the rotor, `v_dc_base`, `voltage_converter` and `voltage` for the AC sides, f0. Signs:
@@ -42,6 +47,13 @@ class PmsgTurbine(Component):
     `curtailment` unless they are given. Source: Lyu, Subotic, Gross 2022, with the project notes; see the parts.
     """
 
+    fidelity = Parameter(
+        "1",
+        "lossless: the paper's analysis model; rms: phasors; dq: averaged filter, inner loops and stator",
+        default="rms",
+        structural=True,
+        choices=("lossless", "rms", "dq"),
+    )
     aggregate = Parameter("1", "number of identical turbines", default=1.0, min=1.0)
     rating = Parameter("VA", "rated power of one turbine, base of pu", default=5e6, above=0.0)
     voltage = Parameter("V", "nominal line-to-line RMS voltage at the grid port", default=33e3, above=0.0)
@@ -84,15 +96,28 @@ class PmsgTurbine(Component):
     pmsg = Part(
         Pmsg,
         "generator",
+        base=PermanentMagnetMachine,
+        select=stages.machine,
+        among=stages.MACHINES,
         rating=lambda self: self.rating,
         voltage=lambda self: self.voltage_converter,
         omega_base=lambda self: self.omega_base,
     )
-    msc = Part(MachineSideConverter, "machine-side converter", voltage=lambda self: self.voltage_converter)
+    msc = Part(
+        MachineSideConverter,
+        "machine-side converter",
+        base=MachineSide,
+        select=stages.machine_side,
+        among=stages.MACHINE_SIDES,
+        voltage=lambda self: self.voltage_converter,
+    )
     dc_link = Part(DcLink, "DC link", voltage=lambda self: self.v_dc_base)
     gsc = Part(
         GridSideConverter,
         "grid-side converter",
+        base=GridSide,
+        select=stages.grid_side,
+        among=stages.GRID_SIDES,
         rating=lambda self: self.rating,
         voltage=lambda self: self.voltage_converter,
         f0=lambda self: self.f0,
@@ -118,14 +143,19 @@ class PmsgTurbine(Component):
         "control of both converters",
         base=ConverterControl,
         curtailment=lambda self: self.curtailment,
-        omega_del=lambda self: self.omega_del,
         K_msc=lambda self: self.K_msc,
+    )
+    schedule = Part(
+        FixedPoint,
+        "where the operating point comes from",
+        base=OperatingSchedule,
+        omega_point=lambda self: self.omega_del,
+        beta_point=lambda self: self.beta_del,
     )
     pitch = Part(
         PitchControl,
         "pitch control",
-        beta_del=lambda self: self.beta_del,
-        omega_del=lambda self: self.omega_del,
+        beta_start=lambda self: self.beta_del,
         K_p=lambda self: self.K_p,
         omega_max=lambda self: self.omega_max,
         beta_min=lambda self: self.beta_min,
@@ -140,6 +170,8 @@ class PmsgTurbine(Component):
     P_pmsg = Variable("pu", "power from the machine into the MSC, base rating", start=0.5)
     P_gsc = Variable("pu", "active power out of the GSC, base rating", start=0.5)
     Q_gsc = Variable("pu", "reactive power out of the GSC, base rating")
+    v_d = Variable("pu", "voltage at the grid side of the GSC's filter, along the GSC's frame", start=1.0)
+    v_q = Variable("pu", "voltage at the grid side of the GSC's filter, across the GSC's frame")
     Q_msc = Variable("pu", "reactive power of the MSC into the machine, base rating")
     P = Variable("W", "active power of all turbines, delivered at the port", start=1e6, nominal=1e6)
     Q = Variable("var", "reactive power of all turbines, delivered at the port", nominal=1e6)
@@ -166,7 +198,7 @@ class PmsgTurbine(Component):
 
     def equations(self) -> None:
         rotor, drive, pmsg, msc, gsc = self.rotor, self.drive, self.pmsg, self.msc, self.gsc
-        control, pitch = self.control, self.pitch
+        control, schedule, pitch = self.control, self.schedule, self.pitch
         # mechanics and power
         self.connect(rotor.wind, self.wind)
         self.connect(rotor.shaft, drive.shaft)
@@ -186,15 +218,38 @@ class PmsgTurbine(Component):
         self.eq(self.P_gsc, gsc.P / self.rating)
         self.eq(self.Q_gsc, gsc.Q / self.rating)
         self.eq(self.Q_msc, msc.Q / self.rating)
-        # control
-        self.connect(control.v_dc, self.v_dc)
-        self.connect(control.Q_gsc, self.Q_gsc)
-        self.connect(control.Q_msc, self.Q_msc)
-        self.connect(control.omega_gsc, gsc.omega)
-        self.connect(control.V_gsc, gsc.V)
-        self.connect(control.omega_msc, pmsg.frame)
-        self.connect(control.V_msc, msc.V)
+        self.connect(self.v_d, gsc.v_d)
+        self.connect(self.v_q, gsc.v_q)
+        # operating point
+        self.connect(schedule.wind, self.wind)
+        self.connect(schedule.omega_r, self.omega_r)
+        self.connect(schedule.beta, pitch.beta)
+        self.connect(schedule.P, self.P_pmsg)
+        # control: what it reads, by name; what it commands, by the name of the converter's input
+        measured = {
+            "v_dc": self.v_dc,
+            "omega_r": self.omega_r,
+            "P_pmsg": self.P_pmsg,
+            "P_gsc": self.P_gsc,
+            "Q_gsc": self.Q_gsc,
+            "Q_msc": self.Q_msc,
+            "v_d": self.v_d,
+            "v_q": self.v_q,
+            "omega_del": schedule.omega_del,
+            "beta_del": schedule.beta_del,
+            "wind": self.wind,
+        }
+        for name in control.declared(Input):
+            self.connect(getattr(control, name), measured[name])
+        for suffix, converter in (("gsc", gsc), ("msc", msc)):
+            for name in converter.declared(Input):
+                if name != "frame":
+                    self.connect(getattr(converter, name), getattr(control, f"{name}_{suffix}"))
+        if "frame" in pmsg.declared(Input):
+            self.connect(pmsg.frame, control.omega_msc)
         self.connect(gsc.frame, self.frame)
+        self.connect(pitch.omega_del, schedule.omega_del)
+        self.connect(pitch.beta_del, schedule.beta_del)
         self.connect(pitch.omega_r, self.omega_r)
         self.connect(pitch.P, self.P_pmsg)
         self.connect(pitch.beta, rotor.beta)

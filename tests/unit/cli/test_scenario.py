@@ -61,7 +61,6 @@ def test_the_good_one_is_good() -> None:
         ("run: {until: 90 s}", "run: 90 s", "GF2203", "12:6", "a mapping"),
         ("[wt.*]", "wt.*", "GF2203", "13:34", "a list"),
         ("[wt.*]", "[]", "GF2003", "13:34", "at least 1"),
-        ("name: case", "name: case\nfidelity: dq", "GF2204", "2:11", "not there yet"),
         ("name: case", "name: case\nfidelity: exact", "GF2204", "2:11", "'exact'"),
         ("name: case", "name: case\nturbines: 0", "GF2003", "2:11", "turbines"),
         ("name: case", "name: case\nturbines: 2.5", "GF2203", "2:11", "whole number"),

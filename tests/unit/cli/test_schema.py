@@ -49,7 +49,7 @@ def test_shipped_scenarios_are_valid(schema: dict[str, Any], file: Path) -> None
         ("active: 100 MW", "active: 100"),
         ("active: 100 MW", "activ: 100 MW"),
         ("type: Bus", "type: Buss"),
-        ("fidelity: rms", "fidelity: dq"),
+        ("fidelity: rms", "fidelity: exact"),
         ("until: 90 s", "until: 90"),
         ("droop: 5 %", "droop: 0"),
         ("aggregate: 10", "aggregate: 0"),

@@ -350,5 +350,5 @@ def test_an_owner_chooses_its_part_by_structure() -> None:
 
 
 def test_a_word_must_be_among_the_choices() -> None:
-    with pytest.raises(GustformError, match="mode must be plain or fancy .*; got 'best'"):
+    with pytest.raises(GustformError, match=r"mode must be plain or fancy .*; got 'best'"):
         _Choosing(mode="best")

@@ -1,0 +1,56 @@
+"""Which model of machine and converters a turbine has: by what the control imposes, and by fidelity."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from gustform.electrical.grid_side import GridSide
+from gustform.electrical.gsc import GridSideConverter
+from gustform.electrical.machine_side import MachineSide
+from gustform.electrical.msc import MachineSideConverter
+from gustform.electrical.permanent_magnet import PermanentMagnetMachine
+from gustform.electrical.pmsg import Pmsg
+from gustform.language import GustformError, Output
+
+# What is imposed (the command that tells it) and the fidelity -> the model.
+_GRID_SIDE: Mapping[tuple[str, str], type[GridSide]] = {
+    ("V_gsc", "rms"): GridSideConverter,
+}
+_MACHINE_SIDE: Mapping[tuple[str, str], type[MachineSide]] = {
+    ("V_msc", "rms"): MachineSideConverter,
+}
+_MACHINE: Mapping[tuple[str, str], type[PermanentMagnetMachine]] = {
+    ("V_msc", "rms"): Pmsg,
+}
+
+GRID_SIDES = tuple(_GRID_SIDE.values())
+MACHINE_SIDES = tuple(_MACHINE_SIDE.values())
+MACHINES = tuple(_MACHINE.values())
+
+
+def grid_side(turbine: Any) -> type[GridSide]:
+    """The grid-side converter of a turbine."""
+    return _find(_GRID_SIDE, turbine)
+
+
+def machine_side(turbine: Any) -> type[MachineSide]:
+    """The machine-side converter of a turbine."""
+    return _find(_MACHINE_SIDE, turbine)
+
+
+def machine(turbine: Any) -> type[PermanentMagnetMachine]:
+    """The generator of a turbine."""
+    return _find(_MACHINE, turbine)
+
+
+def _find(models: Mapping[tuple[str, str], type[Any]], turbine: Any) -> type[Any]:
+    commands = turbine.control.declared(Output)
+    for (command, fidelity), kind in models.items():
+        if command in commands and fidelity == turbine.fidelity:
+            return kind
+    raise GustformError(
+        "GF1023",
+        f"{type(turbine.control).__name__} cannot run at fidelity {turbine.fidelity}",
+        hint="fidelity: rms",
+    )
