@@ -81,6 +81,23 @@ class TypeEvaluator:
         arguments = [y, yp, w, u, d, p]
         return self._evaluate(self._residual, [*arguments, self._call_values(arguments)])[0]
 
+    def total_jacobian(self, values: Any, columns: Any) -> Any:
+        """The derivative of `values` with respect to the symbols in `columns`, also through the tables."""
+        total = ca.jacobian(values, columns)
+        gradients: list[Any] = []
+        for number, call in enumerate(self.unit.calls):
+
+            def whole(e: Any, number: int = number) -> Any:
+                g = ca.jacobian(e, columns)
+                for c, previous in zip(self.unit.calls[:number], gradients, strict=True):
+                    g = g + ca.jacobian(e, c.value) @ previous
+                return g
+
+            gradient = call.x_slope * whole(call.x) + call.y_slope * whole(call.y)
+            total = total + ca.jacobian(values, call.value) @ gradient
+            gradients.append(gradient)
+        return total
+
     def initial_pattern(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Rows and columns of `initial_jacobian`: columns are y, then w, then yp, then the free parameters."""
         if self._initial_pattern is None:
@@ -90,20 +107,7 @@ class TypeEvaluator:
             if self._values.numel() == 0 or columns.numel() == 0:
                 self._initial_pattern = (np.zeros(0, int), np.zeros(0, int))
                 return self._initial_pattern
-            total = ca.jacobian(self._values, columns)
-            gradients: list[Any] = []
-            for number, call in enumerate(unit.calls):
-
-                def whole(e: Any, number: int = number) -> Any:
-                    g = ca.jacobian(e, columns)
-                    for c, previous in zip(unit.calls[:number], gradients, strict=True):
-                        g = g + ca.jacobian(e, c.value) @ previous
-                    return g
-
-                gradient = call.x_slope * whole(call.x) + call.y_slope * whole(call.y)
-                total = total + ca.jacobian(self._values, call.value) @ gradient
-                gradients.append(gradient)
-            total = ca.sparsify(total)
+            total = ca.sparsify(self.total_jacobian(self._values, columns))
             rows, cols = total.sparsity().get_triplet()
             self._jacobian = self._function("jacobian", [ca.vertcat(*[total.nz[k] for k in range(total.nnz())])])
             self._initial_pattern = (np.array(rows, int), np.array(cols, int))
