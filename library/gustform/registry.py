@@ -16,8 +16,12 @@ from gustform.aero.table_rotor import TableRotor, read_cp_table
 from gustform.control.dual_port import DualPort
 from gustform.control.schedule import FixedPoint
 from gustform.electrical.bus import Bus
+from gustform.electrical.constant_field import ConstantField
 from gustform.electrical.constant_power_load import ConstantPowerLoad
+from gustform.electrical.first_order_governor import FirstOrderGovernor
 from gustform.electrical.line import Line
+from gustform.electrical.machine6 import Machine6
+from gustform.electrical.machine_classical import ClassicalMachine
 from gustform.electrical.sexs import SEXS
 from gustform.electrical.stiff_frame import StiffFrame
 from gustform.electrical.stiff_grid import StiffGrid
@@ -76,9 +80,13 @@ UNITS: Mapping[str, Unit] = MappingProxyType(
 
 PARTS: Mapping[str, Replacement] = MappingProxyType(
     {
+        "ClassicalMachine": Replacement(ClassicalMachine),
         "ClosedFormRotor": Replacement(ClosedFormRotor),
+        "ConstantField": Replacement(ConstantField),
         "DualPort": Replacement(DualPort),
+        "FirstOrderGovernor": Replacement(FirstOrderGovernor),
         "FixedPoint": Replacement(FixedPoint),
+        "Machine6": Replacement(Machine6),
         "SEXS": Replacement(SEXS),
         "TGOV1": Replacement(TGOV1),
         "TableRotor": Replacement(TableRotor, tables={"cp": read_cp_table}),

@@ -9,8 +9,10 @@ import numpy as np
 from gustform.aero.closed_form_rotor import ClosedFormRotor, polynomial
 from gustform.aero.table_rotor import TableRotor
 from gustform.electrical.bus import Bus
+from gustform.electrical.constant_field import ConstantField
 from gustform.electrical.constant_power_load import ConstantPowerLoad
 from gustform.electrical.line import Line
+from gustform.electrical.machine_classical import ClassicalMachine
 from gustform.electrical.stiff_frame import StiffFrame
 from gustform.electrical.stiff_grid import StiffGrid
 from gustform.electrical.synchronous_generator import SynchronousGenerator
@@ -89,10 +91,10 @@ def with_transformer() -> System:
     return s
 
 
-def with_generator() -> System:
+def with_generator(**parts: str | Component) -> System:
     """A power plant and its load."""
     s = System()
-    s.add("sg", SynchronousGenerator())
+    s.add("sg", SynchronousGenerator(**parts))
     s.add("bus", Bus())
     s.add("load", ConstantPowerLoad(reactive=20e6))
     s.connect("sg.terminal", "bus.terminal")
@@ -107,11 +109,15 @@ def _turbine(**parameters: float | Component) -> PmsgTurbine:
 
 SYSTEMS: dict[str, Callable[[], System]] = {
     "Bus": with_load,
+    "ClassicalMachine": lambda: with_generator(machine=ClassicalMachine()),
     "ClosedFormRotor": lambda: with_turbine(_turbine(rotor=ClosedFormRotor())),
+    "ConstantField": lambda: with_generator(exciter=ConstantField()),
     "ConstantPowerLoad": with_load,
     "DualPort": lambda: with_turbine(_turbine()),
+    "FirstOrderGovernor": lambda: with_generator(fidelity="lossless"),
     "FixedPoint": lambda: with_turbine(_turbine()),
     "Line": with_line,
+    "Machine6": with_generator,
     "PmsgTurbine": lambda: with_turbine(_turbine()),
     "SEXS": with_generator,
     "StiffFrame": lambda: with_turbine(_turbine(), "frame.omega"),

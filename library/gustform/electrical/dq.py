@@ -59,15 +59,21 @@ class DqImpedance(Component):
     pu of the machine's rating; x at nominal frequency.
     """
 
+    lossless = Parameter("1", "whether the series resistance is left out", default=False, structural=True)
     r = Parameter("pu", "series resistance", default=0.0, min=0.0)
     x = Parameter("pu", "series reactance at nominal frequency", default=0.12, min=0.0)
 
     a = DqPort("one side")
     b = DqPort("other side")
 
+    @property
+    def resistance(self) -> float:
+        """The series resistance that counts, pu."""
+        return 0.0 if self.lossless else self.r
+
     def equations(self) -> None:
-        a, b = self.a, self.b
+        a, b, r = self.a, self.b, self.resistance
         self.eq(a.id + b.id, 0)
         self.eq(a.iq + b.iq, 0)
-        self.eq(a.vd - b.vd, self.r * a.id - self.x * a.iq)
-        self.eq(a.vq - b.vq, self.r * a.iq + self.x * a.id)
+        self.eq(a.vd - b.vd, r * a.id - self.x * a.iq)
+        self.eq(a.vq - b.vq, r * a.iq + self.x * a.id)

@@ -5,36 +5,30 @@ from __future__ import annotations
 import cmath
 from dataclasses import dataclass
 
-from gustform.conventions import NOMINAL_FREQUENCY, TWO_PI
-from gustform.electrical.dq import DqPort
-from gustform.language import Component, Input, Output, Parameter, Variable
+from gustform.electrical.synchronous_machine import MachineRest, SynchronousMachine
+from gustform.language import Parameter, Variable
 
 
 @dataclass(frozen=True)
-class MachineRest:
-    """A machine at rest at nominal frequency: angle in rad, the rest in pu."""
+class Machine6Rest(MachineRest):
+    """A machine of sixth order at rest: voltages and flux linkages too, pu."""
 
-    delta: float
     E1q: float
     E1d: float
     psi_1d: float
     psi_2q: float
     psi_d: float
     psi_q: float
-    i_d: float
-    i_q: float
-    P_m: float
-    E_fd: float
 
 
-class Machine6(Component):
+class Machine6(SynchronousMachine):
     """Synchronous machine with field and damper on d and two dampers on q.
 
     States: delta, omega, E'q, E'd, psi_1d, psi_2q.
 
     Currents i_d, i_q out of the machine (generator convention inside; the port's flows are into it), pu of the rating:
 
-        2 H omega d(omega)/dt = P_m - T_e            d(delta)/dt = w0 (omega - frame)
+        2 H omega d(omega)/dt = P_m - T_e - D (omega - 1)      d(delta)/dt = w0 (omega - frame)
         T_e   = psi_d i_q - psi_q i_d
         v_d   = -r_a i_d - psi_q                     v_q   = -r_a i_q + psi_d
         psi_d = -xd'' i_d + (xd''-xl)/(xd'-xl) E'q + (xd'-xd'')/(xd'-xl) psi_1d
@@ -53,8 +47,6 @@ class Machine6(Component):
     Source: Sauer and Pai, Power System Dynamics and Stability, 1998, chapter 3; data: project notes, set A.
     """
 
-    f0 = Parameter("Hz", "nominal frequency", default=NOMINAL_FREQUENCY, above=0.0)
-    H = Parameter("s", "inertia constant, base the rating", default=6.0, above=0.0)
     xd = Parameter("pu", "synchronous reactance, d axis", default=1.81, above=0.0)
     xq = Parameter("pu", "synchronous reactance, q axis", default=1.76, above=0.0)
     xd1 = Parameter("pu", "transient reactance xd'", default=0.30, above=0.0)
@@ -62,39 +54,27 @@ class Machine6(Component):
     xd2 = Parameter("pu", "subtransient reactance xd''", default=0.23, above=0.0)
     xq2 = Parameter("pu", "subtransient reactance xq''", default=0.25, above=0.0)
     xl = Parameter("pu", "leakage reactance", default=0.15, min=0.0)
-    ra = Parameter("pu", "stator resistance", default=0.003, min=0.0)
     Td0_1 = Parameter("s", "open-circuit transient time constant T'd0", default=8.0, above=0.0)
     Tq0_1 = Parameter("s", "open-circuit transient time constant T'q0", default=1.0, above=0.0)
     Td0_2 = Parameter("s", "open-circuit subtransient time constant T''d0", default=0.03, above=0.0)
     Tq0_2 = Parameter("s", "open-circuit subtransient time constant T''q0", default=0.07, above=0.0)
 
-    P_m = Input("pu", "mechanical power, base the rating", start=0.4)
-    E_fd = Input("pu", "field voltage; 1 gives rated voltage at no load", start=1.3)
-    frame = Input("pu", "speed of the phasor frame, base w0", start=1.0)
-    stator = DqPort("stator terminals")
-
-    omega = Output("pu", "rotor speed, base w0", start=1.0, min=0.5, max=1.5)
-    delta = Output("rad", "angle of the q axis against the phasor frame", start=0.6, fixed=True)
     E1q = Variable("pu", "E'q, transient voltage of the field winding", start=0.92)
     E1d = Variable("pu", "E'd, transient voltage of the q-axis damper", start=0.34)
     psi_1d = Variable("pu", "flux linkage of the d-axis damper", start=0.88)
     psi_2q = Variable("pu", "flux linkage of the second q-axis damper", start=-0.5)
     psi_d = Variable("pu", "stator flux linkage, d axis", start=0.89)
     psi_q = Variable("pu", "stator flux linkage, q axis", start=-0.47)
-    i_d = Variable("pu", "stator current out of the machine, d axis", start=0.25)
-    i_q = Variable("pu", "stator current out of the machine, q axis", start=0.32)
-    T_e = Variable("pu", "air-gap power", start=0.4)
-    V_t = Output("pu", "terminal voltage", start=1.0)
 
-    def rest(self, power: complex, voltage: complex) -> MachineRest:
+    def rest(self, power: complex, voltage: complex) -> Machine6Rest:
         """The machine at rest, delivering `power` at the terminal phasor `voltage` (pu)."""
-        v, i = voltage, (power / voltage).conjugate()
-        delta = cmath.phase(v + complex(self.ra, self.xq) * i)
+        v, i, ra = voltage, (power / voltage).conjugate(), self.resistance
+        delta = cmath.phase(v + complex(ra, self.xq) * i)
         turn = cmath.exp(-1j * (delta - cmath.pi / 2))  # network to d + jq
         v_d, v_q, i_d, i_q = (v * turn).real, (v * turn).imag, (i * turn).real, (i * turn).imag
-        psi_d, psi_q = v_q + self.ra * i_q, -(v_d + self.ra * i_d)
+        psi_d, psi_q = v_q + ra * i_q, -(v_d + ra * i_d)
         E1q, E1d = psi_d + self.xd1 * i_d, (self.xq - self.xq1) * i_q
-        return MachineRest(
+        return Machine6Rest(
             delta=delta,
             E1q=E1q,
             E1d=E1d,
@@ -109,18 +89,14 @@ class Machine6(Component):
         )
 
     def equations(self) -> None:
+        super().equations()
         xd1, xq1, xd2, xq2, xl = self.xd1, self.xq1, self.xd2, self.xq2, self.xl
         E1q, E1d, psi_1d, psi_2q = self.E1q, self.E1d, self.psi_1d, self.psi_2q
-        i_d, i_q, v = self.i_d, self.i_q, self.stator
-        self.eq(v.id, -i_d)
-        self.eq(v.iq, -i_q)
-        # swing
-        self.eq(2.0 * self.H * self.der(self.omega), (self.P_m - self.T_e) / self.omega)
-        self.eq(self.der(self.delta), TWO_PI * self.f0 * (self.omega - self.frame))
-        self.eq(self.T_e, self.psi_d * i_q - self.psi_q * i_d)
+        i_d, i_q, v, ra = self.i_d, self.i_q, self.stator, self.resistance
         # stator
-        self.eq(v.vd, -self.ra * i_d - self.psi_q)
-        self.eq(v.vq, -self.ra * i_q + self.psi_d)
+        self.eq(v.vd, -ra * i_d - self.psi_q)
+        self.eq(v.vq, -ra * i_q + self.psi_d)
+        self.eq(self.T_e, self.psi_d * i_q - self.psi_q * i_d)
         self.eq(self.psi_d, -xd2 * i_d + (xd2 - xl) / (xd1 - xl) * E1q + (xd1 - xd2) / (xd1 - xl) * psi_1d)
         self.eq(self.psi_q, -xq2 * i_q - (xq2 - xl) / (xq1 - xl) * E1d + (xq1 - xq2) / (xq1 - xl) * psi_2q)
         # rotor windings
@@ -132,4 +108,3 @@ class Machine6(Component):
         self.eq(self.Tq0_1 * self.der(E1d), -E1d + (self.xq - xq1) * (i_q - damper_q))
         self.eq(self.Td0_2 * self.der(psi_1d), -psi_1d + E1q - (xd1 - xl) * i_d)
         self.eq(self.Tq0_2 * self.der(psi_2q), -psi_2q - E1d - (xq1 - xl) * i_q)
-        self.eq(self.V_t, (v.vd * v.vd + v.vq * v.vq) ** 0.5)
