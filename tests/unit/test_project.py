@@ -361,7 +361,7 @@ def test_the_extractor_reads_both_kinds_of_block() -> None:
 ALL_COMMANDS = [command for path in DOCUMENTS for command in commands_of(path, path.read_text())]
 
 RUN = {"gustform", "python", "python3", "gust-run"}
-"""Programs whose README lines are run, in order, in one folder that looks like the work tree."""
+"""Programs whose lines in a document are run, in order, in one folder that looks like the work tree."""
 
 
 def test_readme_shows_the_two_commands_first() -> None:
@@ -390,13 +390,16 @@ def test_documented_commands_exist(command: Command) -> None:
         assert program in RUN, f"teach this test how to check {command}"
 
 
+WITH_COMMANDS = sorted({c.document for c in ALL_COMMANDS if Path(c.words[0]).name in RUN})
+
+
 @pytest.mark.timeout(600)
-def test_readme_commands_run(tmp_path: Path) -> None:
+@pytest.mark.parametrize("document", WITH_COMMANDS, ids=lambda path: path.name)
+def test_documented_commands_run(document: Path, tmp_path: Path) -> None:
     # Results land in the folder, while every path into the work tree is good.
     for name in {path.parts[0] for path in load_tool("check_files").work_tree_files(ROOT)}:
         (tmp_path / name).symlink_to(ROOT / name)
-    readme = ROOT / "README.md"
-    for command in commands_of(readme, readme.read_text()):
+    for command in commands_of(document, document.read_text()):
         program = Path(command.words[0]).name
         if command.words[:2] == ["make", "demo"]:
             result = run("make", "-C", ROOT, "demo", f"DEMO_OUT={tmp_path / 'demo'}", timeout=500)
@@ -405,6 +408,17 @@ def test_readme_commands_run(tmp_path: Path) -> None:
         else:
             continue
         assert result.returncode == 0, f"{command}\n{result.stdout}\n{result.stderr}"
+
+
+def test_the_tutorial_does_what_it_says(tmp_path: Path) -> None:
+    """Its Python blocks, one after the other, print what it shows as their output."""
+    text = (ROOT / "docs" / "tutorial.md").read_text()
+    program = tmp_path / "tutorial.py"
+    program.write_text("\n".join(re.findall(r"^```python\n(.*?)^```", text, flags=re.DOTALL | re.MULTILINE)))
+    shown = re.findall(r"^```text\n(.*?)^```", text, flags=re.DOTALL | re.MULTILINE)
+    result = run(sys.executable, program)
+    assert result.returncode == 0, result.stderr
+    assert result.stdout == "".join(shown)
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
