@@ -28,7 +28,7 @@ BLUE, ORANGE, GREEN, RED, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#7
 DARK = "#222222"
 _COLOURS = (BLUE, ORANGE, GREEN, RED)
 
-_STYLE: Any = {
+STYLE: Any = {
     "font.size": 9.5,
     "axes.titlesize": 10,
     "axes.titleweight": "bold",
@@ -119,7 +119,7 @@ def _draw_panels(panels: Filled, run: RunData, figure: Path) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         rows = -(-len(panels) // 2)
         canvas = Figure(figsize=(10.0, 0.9 + 2.3 * rows))
         FigureCanvasAgg(canvas)
