@@ -84,6 +84,29 @@ def check(
 
 
 @app.command()
+def linearise(
+    scenario: Scenario,
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="folder of the results [results/NAME]")] = None,
+    overrides: Overrides = None,
+    inputs: Annotated[
+        list[str] | None,
+        typer.Option("--input", metavar="NAME", help="a parameter as an input, beside wind and what events set"),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Eigenvalues, participation and A, B, C, D at the steady state; writes linear.nc, modes.json, eigenvalues.png."""
+    with guarded():
+        from gustform_cli.linearise import as_json, as_text, warnings
+        from gustform_cli.linearise import linearise as run
+
+        folder = out if out is not None else Path("results") / scenario.stem
+        result = run(scenario, folder, overrides or [], inputs or [])
+        for line in warnings(result):
+            print(f"warning: {line}", file=sys.stderr)
+        print(as_json(result) if json else as_text(result))
+
+
+@app.command()
 def info(
     name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="component type; all are listed without")] = None,
 ) -> None:
