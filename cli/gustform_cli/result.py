@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     import h5py
 
 RESULT = "result.nc"
-PARTIAL = "result.nc.part"
+PARTIAL = f"{RESULT}.part"
 
 _COMPRESSED_FROM = 16 << 20  # bytes; below, the time is worth more than the space
 
@@ -105,12 +105,13 @@ class ResultWriter:
         most_rows: int,
         block_rows: int,
         attributes: Mapping[str, str],
+        name: str = RESULT,
     ) -> None:
         import h5py  # 0.2 s: not for `gustform --help`
 
-        self.path = folder / PARTIAL
+        self.path = folder / f"{name}.part"
         self.rows = 0
-        self._final = folder / RESULT
+        self._final = folder / name
         self._variables = arrange(quantities, counts)
         # A block is a chunk: it is written once, and HDF5 has nothing to keep that would grow with the run.
         self._chunk_rows = min(block_rows, most_rows)
