@@ -13,8 +13,11 @@ class ConstantPowerLoad(Component):
         i = conj(S / v)                     for |v| >= V_min V_n
         i = conj(S) v / (V_min V_n)^2       below: the constant impedance that takes S at V_min V_n
 
-    Both are i = conj(S) v / max(|v|^2, (V_min V_n)^2). Power and current are continuous; P and Q fall with |v|^2 below
-    the threshold, so that the network keeps a solution in a deep voltage dip. P, Q > 0 into the load. SI units.
+    Both are i = conj(S) v / max(|v|^2, (V_min V_n)^2). Power and current are continuous, their slopes bend: an
+    impedance that takes S at the threshold has no freedom left for the slope. P and Q fall with |v|^2 below it, so that
+    the network keeps a solution in a deep voltage dip. At and above V_min nothing changes. P, Q > 0 into the load.
+    SI units.
+
     Source: Kundur, Power System Stability and Control, 1994, 7.1 (static load models, low-voltage fallback).
     """
 
