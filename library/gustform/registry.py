@@ -13,6 +13,7 @@ from types import MappingProxyType
 
 from gustform.aero.closed_form_rotor import ClosedFormRotor
 from gustform.aero.table_rotor import TableRotor, read_cp_table
+from gustform.control.curtailment_schedule import CurtailmentSchedule
 from gustform.control.dual_port import DualPort
 from gustform.control.schedule import FixedPoint
 from gustform.electrical.bus import Bus
@@ -32,6 +33,8 @@ from gustform.language.component import Component, suggest
 from gustform.language.declare import Part
 from gustform.language.errors import GustformError
 from gustform.language.table import TableData
+from gustform.mechanical.one_mass import OneMass
+from gustform.mechanical.two_mass import TwoMass
 from gustform.turbines.pmsg_turbine import PmsgTurbine
 
 
@@ -83,12 +86,15 @@ PARTS: Mapping[str, Replacement] = MappingProxyType(
         "ClassicalMachine": Replacement(ClassicalMachine),
         "ClosedFormRotor": Replacement(ClosedFormRotor),
         "ConstantField": Replacement(ConstantField),
+        "CurtailmentSchedule": Replacement(CurtailmentSchedule),
         "DualPort": Replacement(DualPort),
         "FirstOrderGovernor": Replacement(FirstOrderGovernor),
         "FixedPoint": Replacement(FixedPoint),
         "Machine6": Replacement(Machine6),
+        "OneMass": Replacement(OneMass),
         "SEXS": Replacement(SEXS),
         "TGOV1": Replacement(TGOV1),
+        "TwoMass": Replacement(TwoMass),
         "TableRotor": Replacement(TableRotor, tables={"cp": read_cp_table}),
     }
 )

@@ -8,6 +8,7 @@ import numpy as np
 
 from gustform.aero.closed_form_rotor import ClosedFormRotor, polynomial
 from gustform.aero.table_rotor import TableRotor
+from gustform.control.curtailment_schedule import CurtailmentSchedule
 from gustform.electrical.bus import Bus
 from gustform.electrical.constant_field import ConstantField
 from gustform.electrical.constant_power_load import ConstantPowerLoad
@@ -20,6 +21,7 @@ from gustform.electrical.transformer import Transformer
 from gustform.language import Component
 from gustform.language.system import Constant, System
 from gustform.language.table import TableData
+from gustform.mechanical.two_mass import TwoMass
 from gustform.registry import component_types
 from gustform.turbines.pmsg_turbine import PmsgTurbine
 
@@ -36,7 +38,16 @@ def sampled_table() -> TableData:
 def example(name: str) -> Component:
     """The registered component of that name with whatever it cannot do without."""
     kind = component_types()[name]
-    return kind(cp=sampled_table()) if kind is TableRotor else kind()
+    if kind is TableRotor:
+        return kind(cp=sampled_table())
+    if kind is CurtailmentSchedule:  # a turbine gives it the tables of its own rotor
+        turbine = PmsgTurbine(wind_speed=WIND, curtailment=0.1, schedule=CurtailmentSchedule(wind_source="estimated"))
+        schedule = turbine.schedule
+        return kind(
+            wind_source="estimated",
+            **{name: schedule.table(name) for name in ("omega_table", "beta_table", "cp")},
+        )
+    return kind()
 
 
 def with_turbine(turbine: PmsgTurbine, frame: str = "grid.omega") -> System:
@@ -113,17 +124,20 @@ SYSTEMS: dict[str, Callable[[], System]] = {
     "ClosedFormRotor": lambda: with_turbine(_turbine(rotor=ClosedFormRotor())),
     "ConstantField": lambda: with_generator(exciter=ConstantField()),
     "ConstantPowerLoad": with_load,
+    "CurtailmentSchedule": lambda: with_turbine(_turbine(schedule=CurtailmentSchedule(wind_source="estimated"))),
     "DualPort": lambda: with_turbine(_turbine()),
     "FirstOrderGovernor": lambda: with_generator(fidelity="lossless"),
     "FixedPoint": lambda: with_turbine(_turbine()),
     "Line": with_line,
     "Machine6": with_generator,
     "PmsgTurbine": lambda: with_turbine(_turbine()),
+    "OneMass": lambda: with_turbine(_turbine()),
     "SEXS": with_generator,
     "StiffFrame": lambda: with_turbine(_turbine(), "frame.omega"),
     "StiffGrid": with_load,
     "SynchronousGenerator": with_generator,
     "TGOV1": with_generator,
+    "TwoMass": lambda: with_turbine(_turbine(drive=TwoMass())),
     "TableRotor": lambda: with_turbine(_turbine(rotor=TableRotor(cp=sampled_table()))),
     "Transformer": with_transformer,
 }

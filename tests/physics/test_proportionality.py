@@ -1,4 +1,4 @@
-"""What dual-port control promises of every steady state: frequency, DC voltage and rotor speed deviate in proportion."""
+"""What dual-port control promises of every steady state: deviations of frequency, DC voltage and speed in proportion."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def test_deviations_are_in_proportion(wind: float, curtailment: float, cache: Ke
         simulation.set_option("rtol", 1e-8)
         simulation.initialise(0.0)
         simulation.advance(SETTLED)
-        _, y, yp = simulation.state()
+        _, y, _ = simulation.state()
     numbers = mine.unknown_numbers(linked)
     turbine = system.components["wt"]
     omega_sg = y[numbers["sg.machine.omega"]]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from gustform.aero.closed_form_rotor import ClosedFormRotor
 from gustform.aero.rotor import Rotor
 from gustform.control.converter_control import ConverterControl
+from gustform.control.curtailment_schedule import CurtailmentSchedule, observer_table, pitch_table, speed_table
 from gustform.control.dual_port import DualPort
 from gustform.control.operating_point import (
     DualPortGains,
@@ -29,6 +30,7 @@ from gustform.electrical.pmsg import Pmsg
 from gustform.electrical.transformer import Transformer
 from gustform.interfaces import AcPort
 from gustform.language import Component, Input, Output, Parameter, Part, Variable
+from gustform.mechanical.drive_train import DriveTrain
 from gustform.mechanical.one_mass import OneMass
 from gustform.turbines import stages
 
@@ -92,7 +94,7 @@ class PmsgTurbine(Component):
     )
 
     rotor = Part(ClosedFormRotor, "aerodynamics", base=Rotor)
-    drive = Part(OneMass, "drive train", w=lambda self: self.omega_del * self.omega_base)
+    drive = Part(OneMass, "drive train", base=DriveTrain, w=lambda self: self.omega_del * self.omega_base)
     pmsg = Part(
         Pmsg,
         "generator",
@@ -149,8 +151,18 @@ class PmsgTurbine(Component):
         FixedPoint,
         "where the operating point comes from",
         base=OperatingSchedule,
+        among=(FixedPoint, CurtailmentSchedule),
         omega_point=lambda self: self.omega_del,
         beta_point=lambda self: self.beta_del,
+        wind_point=lambda self: self.wind_speed,
+        curtailment=lambda self: self.control.curtailment,
+        omega_max=lambda self: self.omega_max,
+        omega_table=lambda self: speed_table(self.rotor, self.limits()),
+        beta_table=lambda self: pitch_table(self.rotor, self.limits()),
+        cp=lambda self: observer_table(self.rotor),
+        H=lambda self: self.drive.J * self.omega_base**2 / (2.0 * self.rating),
+        v_tip=lambda self: self.rotor.radius * self.omega_base,
+        v_one=lambda self: (self.rating / self.rotor.power_per_cube()) ** (1.0 / 3.0),
     )
     pitch = Part(
         PitchControl,
@@ -201,8 +213,8 @@ class PmsgTurbine(Component):
         control, schedule, pitch = self.control, self.schedule, self.pitch
         # mechanics and power
         self.connect(rotor.wind, self.wind)
-        self.connect(rotor.shaft, drive.shaft)
-        self.connect(pmsg.shaft, drive.shaft)
+        self.connect(rotor.shaft, drive.rotor)
+        self.connect(pmsg.shaft, drive.generator)
         self.connect(pmsg.terminal, msc.machine)
         self.connect(msc.dc, self.dc_link.machine)
         self.connect(gsc.dc, self.dc_link.grid)
