@@ -28,9 +28,7 @@ def draw(modes: Modes, title: str, file: Path) -> Path:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    components: dict[str, float] = {}
-    for mode in modes.listed:
-        components.setdefault(_component(mode), 0.0)
+    components = dict.fromkeys(_component(q.name) for q in modes.states)
     colours = {name: _COLOURS[k % len(_COLOURS)] for k, name in enumerate(components)}
     slow = [m for m in modes.listed if abs(m.eigenvalue) <= _SLOW]
     if len(slow) < 2:
@@ -60,8 +58,8 @@ def draw(modes: Modes, title: str, file: Path) -> Path:
     return file
 
 
-def _component(mode: Mode) -> str:
-    return mode.participation[0][0].split(".")[0].split("[")[0]
+def _component(state: str) -> str:
+    return state.split(".")[0].split("[")[0]
 
 
 def _point(axis: Axes, mode: Mode, colours: dict[str, str]) -> None:
@@ -69,10 +67,10 @@ def _point(axis: Axes, mode: Mode, colours: dict[str, str]) -> None:
     if mode.kind in (REFERENCE, CONSTANT):
         axis.plot([0.0], [0.0], "s", markersize=8, markerfacecolor="none", color=GREY, zorder=4, clip_on=False)
         return
+    colour = colours[_component(mode.participation[0][0])]
     axis.plot(
-        [value.real], [value.imag], "x", markersize=7, markeredgewidth=1.8, color=colours[_component(mode)],
-        zorder=5, clip_on=False,
-    )  # fmt: skip
+        [value.real], [value.imag], "x", markersize=7, markeredgewidth=1.8, color=colour, zorder=5, clip_on=False
+    )
 
 
 def _right_half(axis: Axes) -> None:
