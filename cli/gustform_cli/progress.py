@@ -51,10 +51,10 @@ class RunProgress:
         if self._bar is not None:
             self._bar.stop()
 
-    def show(self, simulated: float) -> None:
-        """Simulated time reached, s."""
+    def show(self, simulated: float, before: str = "") -> None:
+        """Simulated time reached, s; `before` is text to stand before it."""
         now = time.perf_counter()
-        text = self.state(simulated, now - self._begin)
+        text = before + self.state(simulated, now - self._begin)
         if self._bar is not None and self._task is not None:
             self._bar.update(self._task, completed=simulated, state=text)
         elif now - self._last_line >= _LINE_EVERY:

@@ -57,18 +57,11 @@ class Run:
         event = min((event.at for event in scenario.events), default=None)
         self.watch = FrequencyWatch(event, self.until) if frequency in names else None
         self.watched = names.index(frequency) if frequency in names else -1
-        self.writer = ResultWriter(
-            file.parent,
-            [Quantity(channel.name, channel.unit, channel.description) for channel in model.channels],
-            model.assembled.counts,
-            most_rows=rows,
-            block_rows=self.block_rows,
-            attributes=_attributes(model),
-            name=file.name,
-        )
+        self.most_rows = rows
+        self.file = file
+        self._writer: ResultWriter | None = None
         self._simulation: Simulation | None = None
         self._stop = False
-        self._reached = 0.0
 
     def __enter__(self) -> Run:
         return self
@@ -83,7 +76,7 @@ class Run:
     @property
     def rows(self) -> int:
         """Rows written so far."""
-        return self.writer.rows
+        return self._writer.rows if self._writer is not None else 0
 
     @property
     def time(self) -> float:
@@ -102,11 +95,12 @@ class Run:
 
         error, status = None, "completed"
         statistics: dict[str, int | float] = {}
+        writer = self._writer = self._new_writer()
         begin = time.perf_counter()
         try:
             self._simulation = Simulation(self.table.to_bytes())
             try:
-                status = self._integrate(self._simulation)
+                status = self._integrate(self._simulation, writer)
             finally:
                 statistics = self._simulation.statistics()
         except GustformError as failure:
@@ -114,7 +108,7 @@ class Run:
         except RunError as failure:
             error, status = run_error(failure), "failed"
         except BaseException:
-            self.writer.finish("failed", {})
+            writer.finish("failed", {})
             raise
         summary = Summary(
             status=status,
@@ -127,9 +121,20 @@ class Run:
             solver=solver_figures(statistics),
             frequency=self.watch.summary(self.every) if self.watch is not None else None,
         )
-        return Ended(summary, self.writer.finish(status, summary.as_dict()), error)
+        return Ended(summary, writer.finish(status, summary.as_dict()), error)
 
-    def _integrate(self, simulation: Simulation) -> str:
+    def _new_writer(self) -> ResultWriter:
+        return ResultWriter(
+            self.file.parent,
+            [Quantity(channel.name, channel.unit, channel.description) for channel in self.model.channels],
+            self.model.assembled.counts,
+            most_rows=self.most_rows,
+            block_rows=self.block_rows,
+            attributes=_attributes(self.model),
+            name=self.file.name,
+        )
+
+    def _integrate(self, simulation: Simulation, writer: ResultWriter) -> str:
         """Advance to the end; "completed" or "interrupted"."""
         assembled = self.model.assembled
         run = assembled.scenario.run
@@ -142,17 +147,18 @@ class Run:
         for number, series in enumerate(self.table.series):
             if series.name in assembled.readers:
                 simulation.set_series_reader(number, assembled.readers[series.name])
-        simulation.set_sink(self.every, self._take, self.block_rows)
+
+        def take(times: NDArray[np.float64], rows: NDArray[np.float32]) -> None:
+            """A block of rows from the solver's thread."""
+            writer.append(times, rows)
+            if self.watch is not None:
+                self.watch.add(times, rows[:, self.watched].astype(np.float64))
+
+        simulation.set_sink(self.every, take, self.block_rows)
         simulation.initialise(0.0)
         if self._stop:
             return "interrupted"
         return _judged(simulation.advance(self.until), simulation.message)
-
-    def _take(self, times: NDArray[np.float64], rows: NDArray[np.float32]) -> None:
-        """A block of rows from the solver's thread."""
-        self.writer.append(times, rows)
-        if self.watch is not None:
-            self.watch.add(times, rows[:, self.watched].astype(np.float64))
 
 
 def _attributes(model: Model) -> dict[str, str]:

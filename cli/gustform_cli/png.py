@@ -1,0 +1,34 @@
+"""A figure as a small PNG: line drawings have few colours, and a palette of them takes a third of the space."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gustform.language.errors import GustformError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_COLOURS = 64  # palette, half tones at the edges of lines among them
+
+
+def save(figure: Figure, file: Path, dpi: float = 150.0) -> Path:
+    """Draw the figure into the file; GF7001 if it cannot be written."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from PIL import Image  # comes with matplotlib, which needs it for this very purpose
+
+    figure.set_dpi(dpi)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    drawn = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
+    palette = drawn.quantize(_COLOURS, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    try:
+        palette.save(file, optimize=True)
+    except (OSError, ValueError) as error:
+        raise GustformError(
+            "GF7001", f"the figure {str(file)!r} cannot be written; {error}", hint="--out with another folder"
+        ) from None
+    return file
