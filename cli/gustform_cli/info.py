@@ -14,7 +14,7 @@ from gustform.language.component import Component
 from gustform.language.connector import Connector
 from gustform.language.declare import Declaration, Input, Output, Parameter, Part, Table, Variable
 from gustform.language.errors import GustformError
-from gustform.registry import UNITS, Unit
+from gustform.registry import PARTS, UNITS, Unit
 from gustform_cli.catalogue import all_types, choices, part_types, short_names
 from gustform_cli.errors import did_you_mean
 
@@ -80,8 +80,16 @@ def _parameters(kind: type[Component]) -> list[tuple[str, ...]]:
         (name, value.unit, default_text(value), range_text(value), value.description)
         for name, value in kind.declared(Parameter).items()
     ]
+    readers = PARTS[kind.__name__].tables if kind.__name__ in PARTS else {}
     return rows + [
-        (name, value.unit, "", "", f"{value.description} (table file)") for name, value in kind.declared(Table).items()
+        (
+            name,
+            value.unit,
+            "" if name in readers else "computed",
+            "",
+            f"{value.description} (table{' file' if name in readers else ''})",
+        )
+        for name, value in kind.declared(Table).items()
     ]
 
 

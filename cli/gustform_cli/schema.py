@@ -12,7 +12,7 @@ from typing import Any
 
 from gustform.language.component import Component
 from gustform.language.declare import Parameter, Part, Table
-from gustform.registry import UNITS, Unit
+from gustform.registry import PARTS, UNITS, Unit
 from gustform_cli.catalogue import choices, part_types, short_names
 from gustform_cli.info import default_text, range_text, sentence
 from gustform_cli.quantity import is_plain
@@ -73,7 +73,11 @@ def _type_schema(name: str, kind: type[Component], unit: Unit | None, placing: d
     for key, parameter in kind.declared(Parameter).items():
         properties[key] = placing[key] if key == "aggregate" and unit is not None else _parameter_schema(parameter)
     for key, table in kind.declared(Table).items():
-        properties[key] = {"type": "string", "description": f"{table.description}: a file, relative to the scenario"}
+        if name in PARTS and key in PARTS[name].tables:
+            properties[key] = {
+                "type": "string",
+                "description": f"{table.description}: a file, relative to the scenario",
+            }
     for key, part in kind.declared(Part).items():
         options: list[dict[str, Any]] = [{"$ref": f"#/$defs/part {choice}"} for choice in choices(part)]
         if part.base is not None:

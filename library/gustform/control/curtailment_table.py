@@ -221,10 +221,10 @@ def _c_text(table: CurtailmentTable, name: str) -> str:
  *
  * Over the wind speed {name}_wind[i], m/s, and {name}_eta[j], the share of the available power that is delivered
  * (above rated wind, {t.rated_wind:.4f} m/s, of the rated power), both increasing:
- *     {name}_omega_del[i][j]   rotor speed, pu of {limits.omega_base:.17g} rad/s, at most {limits.omega_max:g}
+ *     {name}_omega_del[i][j]   rotor speed, pu of {limits.omega_base!r} rad/s, at most {limits.omega_max:g}
  *     {name}_beta_del[i][j]    pitch angle, deg, at least {limits.beta_min:g}
  *     {name}_feasible[i][j]    1: solved; 0: no such point ({missing} of {n * m}), its neighbour's values stand there
- * Rated power {limits.rating:.17g} W; in operation from {limits.cut_in:g} to {limits.cut_out:g} m/s.
+ * Rated power {limits.rating!r} W; in operation from {limits.cut_in:g} to {limits.cut_out:g} m/s.
  * C99. Include this file, or compile it and declare the arrays extern.
  */
 

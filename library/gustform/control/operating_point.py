@@ -173,8 +173,8 @@ def _operating_point(
         if ratio is None and limits.omega_max * to_ratio > aero.ratios[1]:
             raise speed_too_low(aero, wind, curtailment, beta_min)
         omega_del = limits.omega_max if ratio is None else min(ratio / to_ratio, limits.omega_max)
-    beta_mpp = pitch_for(available, omega_mpp)
     beta_del = pitch_for(target, omega_del)
+    beta_mpp = pitch_for(available, omega_mpp)
     K_wr = K_beta = 0.0
     rated_wind = (limits.rating / (per_cube * cp_max)) ** (1.0 / 3.0)
     if omega_del > omega_mpp and wind < rated_wind:
