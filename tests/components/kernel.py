@@ -60,6 +60,7 @@ class Point:
     yp: Array
     w: Array
     u: Array
+    d: Array
     p: Array
     tables: list[TableData] = field(default_factory=list)
 
@@ -96,7 +97,7 @@ class CompiledKernel:
             )  # fmt: skip
             kept.append(table)
             tables[k] = ctypes.pointer(table)
-        point = _Point(0.0, cj, *(pointer(v) for v in (at.y, at.yp, at.w, at.u, np.zeros(1), at.p, constants)), tables)
+        point = _Point(0.0, cj, *(pointer(v) for v in (at.y, at.yp, at.w, at.u, at.d, at.p, constants)), tables)
         self._kept = kept  # ctypes does not hold what it points at
         return point
 

@@ -14,6 +14,7 @@ from gustform.electrical.constant_field import ConstantField
 from gustform.electrical.constant_power_load import ConstantPowerLoad
 from gustform.electrical.line import Line
 from gustform.electrical.machine_classical import ClassicalMachine
+from gustform.electrical.sexs import SEXS
 from gustform.electrical.stiff_frame import StiffFrame
 from gustform.electrical.stiff_grid import StiffGrid
 from gustform.electrical.synchronous_generator import SynchronousGenerator
@@ -22,8 +23,8 @@ from gustform.language import Component
 from gustform.language.system import Constant, System
 from gustform.language.table import TableData
 from gustform.mechanical.two_mass import TwoMass
-from gustform.registry import component_types
 from gustform.turbines.pmsg_turbine import PmsgTurbine
+from gustform_cli.catalogue import all_types
 
 WIND = 9.0  # m/s: below rated, speed and pitch both off their limits
 
@@ -36,8 +37,10 @@ def sampled_table() -> TableData:
 
 
 def example(name: str) -> Component:
-    """The registered component of that name with whatever it cannot do without."""
-    kind = component_types()[name]
+    """The component of that name with whatever it cannot do without."""
+    if name in VARIANTS:
+        return VARIANTS[name]()
+    kind = all_types()[name]
     if kind is TableRotor:
         return kind(cp=sampled_table())
     if kind is CurtailmentSchedule:  # a turbine gives it the tables of its own rotor
@@ -140,4 +143,11 @@ SYSTEMS: dict[str, Callable[[], System]] = {
     "TwoMass": lambda: with_turbine(_turbine(drive=TwoMass())),
     "TableRotor": lambda: with_turbine(_turbine(rotor=TableRotor(cp=sampled_table()))),
     "Transformer": with_transformer,
+}
+
+# Units whose structure depends on a choice, as that choice makes them.
+VARIANTS: dict[str, Callable[[], Component]] = {
+    "SynchronousGenerator, lossless": lambda: SynchronousGenerator(fidelity="lossless"),
+    "SynchronousGenerator, lossless with exciter": lambda: SynchronousGenerator(fidelity="lossless", exciter=SEXS()),
+    "SynchronousGenerator, classical": lambda: SynchronousGenerator(machine=ClassicalMachine()),
 }

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import cmath
+import itertools
 from dataclasses import dataclass
 
 from gustform.electrical.synchronous_machine import MachineRest, SynchronousMachine
-from gustform.language import Parameter, Variable
+from gustform.language import GustformError, Parameter, Variable
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,8 @@ class Machine6(SynchronousMachine):
         T''q0 dpsi_2q/dt = -psi_2q - E'd - (xq'-xl) i_q
 
     The swing equation is in its power form, which belongs to a stator without speed voltages: T_e is then the air-gap
-    power. Base of powers: the rating; of omega: w0 = 2 pi f0; time in s. No saturation.
+    power. Base of powers: the rating; of omega: w0 = 2 pi f0; time in s. No saturation. On each axis
+    xl < x'' <= x' <= x.
 
     delta is the angle of the q axis against the phasor frame and keeps its start value in a steady state: the machine
     is the system's reference angle.
@@ -68,6 +70,7 @@ class Machine6(SynchronousMachine):
 
     def rest(self, power: complex, voltage: complex) -> Machine6Rest:
         """The machine at rest, delivering `power` at the terminal phasor `voltage` (pu)."""
+        self.check_reactances()
         v, i, ra = voltage, (power / voltage).conjugate(), self.resistance
         delta = cmath.phase(v + complex(ra, self.xq) * i)
         turn = cmath.exp(-1j * (delta - cmath.pi / 2))  # network to d + jq
@@ -87,6 +90,19 @@ class Machine6(SynchronousMachine):
             P_m=psi_d * i_q - psi_q * i_d,
             E_fd=E1q + (self.xd - self.xd1) * i_d,
         )
+
+    def check_reactances(self) -> None:
+        """GF2041 if they do not grow from the leakage to the synchronous reactance."""
+        for names in (("xl", "xd2", "xd1", "xd"), ("xl", "xq2", "xq1", "xq")):
+            for low, high in itertools.pairwise(names):
+                a, b = self.value(low), self.value(high)
+                if b < a or (low == "xl" and b == a):
+                    raise GustformError(
+                        "GF2041",
+                        f"{self.path}.{high} must be {'above' if low == 'xl' else 'at least'} {low} = {a:g} "
+                        f"({self.declarations()[high].description}, pu); got {b:g}",
+                        hint=f"{' < '.join(names[:2])} <= {' <= '.join(names[2:])}",
+                    )
 
     def equations(self) -> None:
         super().equations()

@@ -20,6 +20,10 @@ if TYPE_CHECKING:
 # A number, or a function of the component it is declared in (numbers in, number out).
 Value = float | Callable[[Any], Any]
 
+# What lies closer to an exclusive bound counts as on it. The reciprocal of a smaller number would leave the range of
+# doubles in its fourth power, and an equation divides by squares of ratios.
+_NEXT = 1e-60
+
 
 def refuse_assignment(instance: Component, name: str) -> NoReturn:
     """GF1002: what is declared is given to the constructor."""
@@ -114,7 +118,7 @@ class Parameter(Declaration):
         number = _check_finite("parameter", path, f"{self.description}, {self.unit}", float(value))
         low, high, above = self.min, self.max, self.above
         wrong = ""
-        if above is not None and not number > above:
+        if above is not None and not number - above >= _NEXT:
             wrong = f"greater than {above:g}"
         elif low is not None and number < low:
             wrong = f"at least {low:g}"
