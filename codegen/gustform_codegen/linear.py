@@ -339,6 +339,9 @@ class Lineariser:
             share = np.abs(vectors[values <= 1e-12 * values[0]]).max(axis=0, initial=0.0)
             if not share.any():
                 share = np.abs(vectors[-1])
+            algebraic = ~differential & (share > 0.1 * share.max())
+            if algebraic.any():  # the derivatives move with them
+                share = np.where(algebraic, share, 0.0)
             names = [
                 f"der({self.linked.unknown_name(int(k))})" if differential[k] else self.linked.unknown_name(int(k))
                 for k in np.argsort(-share)[:6]

@@ -88,8 +88,9 @@ def _margin(axis: Axes, letter: str, sweep: Sweep) -> None:
         axis.axvline(value, color=GREY, linewidth=0.9, linestyle=(0, (4, 3)), zorder=1)
         axis.annotate(
             name, (value, 0.0), xycoords=("data", "axes fraction"), xytext=(3 if name == "here" else -3, 4),
-            textcoords="offset points", rotation=90, ha="left" if name == "here" else "right", va="bottom", fontsize=7.5,
-            color="#555555", bbox={"boxstyle": "square,pad=0.05", "facecolor": "white", "edgecolor": "none"},
+            textcoords="offset points", rotation=90, ha="left" if name == "here" else "right", va="bottom",
+            fontsize=7.5, color="#555555", zorder=1,
+            bbox={"boxstyle": "square,pad=0.05", "facecolor": "white", "edgecolor": "none"},
         )  # fmt: skip
     axis.set_xlabel(f"{sweep.key}{unit}")
     axis.legend(loc="best" if len(sweep.curves) <= 3 else "lower left", fontsize=7.5)
