@@ -63,12 +63,14 @@ def test_bounds_are_told_with_the_sentence_unit_and_something_to_try() -> None:
     assert text == "error GF2003: Machine.D must be at least 0 (damping, pu); got -0.1 — try the default, 1.5"
 
 
-@pytest.mark.parametrize(("name", "value"), [("H", 0.0), ("H", 100.5), ("D", -1e-9), ("n", 0), ("P", -1), ("order", 7)])
+@pytest.mark.parametrize(
+    ("name", "value"), [("H", 0.0), ("H", 1e-61), ("H", 100.5), ("D", -1e-9), ("n", 0), ("P", -1), ("order", 7)]
+)
 def test_out_of_bounds(name: str, value: float) -> None:
     assert f"Machine.{name} must be" in refused("GF2003", lambda: Machine(**{name: value}))
 
 
-@pytest.mark.parametrize(("name", "value"), [("H", 1e-300), ("H", 100), ("D", 0), ("n", 1), ("order", 2), ("order", 6)])
+@pytest.mark.parametrize(("name", "value"), [("H", 1e-60), ("H", 100), ("D", 0), ("n", 1), ("order", 2), ("order", 6)])
 def test_inclusive_and_exclusive_bounds_let_their_edge_in_or_not(name: str, value: float) -> None:
     assert Machine(**{name: value}).value(name) == value
 
