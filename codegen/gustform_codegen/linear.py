@@ -33,6 +33,7 @@ _STEADY = 1e-6  # largest scaled residual, and share of nominal a second, that s
 _SINGULAR = 1e-14  # reciprocal condition of the equilibrated matrix below which index one is refused
 _AT_BEND = 1e-7  # distance from a bend, as a share of nominal, that counts as standing on it
 _ASIDE = 1e-6  # step to either side of a bend, as a share of nominal
+_REACHES = (0.01, 0.1, 0.1, 1.0, 1.0, 1.0, 10.0, 10.0)  # how far to look for the other parts of a limiter, of nominal
 _JUMP = 1e-4  # change between both sides, as a share of the largest term of the equation, that is no curvature
 
 Ints = NDArray[np.int64]
@@ -149,6 +150,24 @@ class _Derivatives(TypeEvaluator):
         jumps[:, some] = jump
         return values, entries, jumps
 
+    def flat(self, arguments: list[Array], entries: Array, nominal: Array) -> NDArray[np.bool_]:
+        """Which derivatives to unknowns a limiter makes zero here: those in an equation with a limiter that are zero
+        and are not so elsewhere. (A factor that is zero, such as a gain, makes them zero everywhere.)"""
+        local = self.column < nominal.shape[0]
+        zero: NDArray[np.bool_] = (np.isin(self.row, list(self.limited)) & local)[:, None] & (entries == 0.0)
+        if not zero.any():
+            return zero
+        size, alive = self.y.numel(), np.zeros(entries.shape, bool)
+        rng = np.random.default_rng(0)
+        for reach in _REACHES:
+            elsewhere = [a.copy() for a in arguments]
+            shift = reach * nominal * rng.uniform(-1.0, 1.0, nominal.shape)
+            elsewhere[0] += shift[:size]
+            elsewhere[2] += shift[size:]
+            there = self.values(elsewhere)[1]
+            alive |= np.isfinite(there) & (there != 0.0)
+        return np.logical_and(zero, alive)
+
     def _bent(self, values: Array, entries: Array, nominal: Array) -> NDArray[np.bool_]:
         """The instances of which a limiter stands at a bend."""
         bent = np.zeros(values.shape[1], bool)
@@ -214,17 +233,16 @@ class Lineariser:
             slots = (arrays.first_input[:, None] + np.arange(len(t.unit.inputs))).astype(int)
             rows = np.concatenate([own, arrays.flow_row], axis=1).astype(int)
             unknowns = np.concatenate([own, arrays.external], axis=1).astype(int)
-            values, entries, jumps = d.at(
-                [
-                    table.start[own].T,
-                    table.start_derivative[own].T,
-                    table.start[arrays.external].T,
-                    linked.operating_input[slots].T,
-                    arrays.discrete.T,
-                    arrays.parameters.T,
-                ],
-                table.nominal[unknowns].T,
-            )
+            arguments = [
+                table.start[own].T,
+                table.start_derivative[own].T,
+                table.start[arrays.external].T,
+                linked.operating_input[slots].T,
+                arrays.discrete.T,
+                arrays.parameters.T,
+            ]
+            nominal = table.nominal[unknowns].T
+            values, entries, jumps = d.at(arguments, nominal)
             is_y = d.column < size + externals
             is_yp = ~is_y & (d.column < 2 * size + externals)
             is_u = ~is_y & ~is_yp
@@ -251,7 +269,7 @@ class Lineariser:
                     some = np.flatnonzero(is_u & (d.row == row))
                     G_u[position] += entry[some] @ du[d.column[some] - 2 * size - externals]
             bends += _limiters(linked, t, d, jumps, unknowns)
-            flats += _limiters(linked, t, d, entries == 0.0, unknowns)
+            flats += _limiters(linked, t, d, d.flat(arguments, entries, nominal), unknowns)
         for position, channel in enumerate(self.outputs):
             if channel.kind == 0:
                 G[position], G_y[position, channel.a] = table.start[channel.a], 1.0

@@ -239,6 +239,15 @@ class Limited(Component):
         self.eq(quantity(1.0, "s") * self.der(self.y), -self.y)
 
 
+class Inactive(Limited):
+    """A gain of zero beside the limiter hides nothing that was there."""
+
+    gain = Parameter("1", "gain", default=0.0)
+
+    def leaves(self) -> object:
+        return maximum(self.x, -1.0) / 1e9 + self.gain * self.y
+
+
 class WithoutBand(Limited):
     def leaves(self) -> object:
         return dead_band(self.y, self.low)
@@ -259,6 +268,7 @@ class Inside(Limited):
         (WithoutBand(low=0.1), 0.0, 0, 1),
         (WithoutBand(low=1e-9), -2.0, 0, 0),  # narrower than what the start is solved to
         (Inside(), -2.0, 0, 0),
+        (Inactive(), 0.0, 0, 0),
     ],
 )
 def test_limiters_at_the_operating_point(
@@ -268,7 +278,8 @@ def test_limiters_at_the_operating_point(
     system = linearise(linked, table)
     x, y = ([q.name for q in system.states].index(name) for name in ("it.x", "it.y"))
     assert system.A[x, y] == pytest.approx(slope, rel=1e-9)
-    assert system.A[x, x] == system.A[y, y] == -1.0
+    assert system.A[x, x] == pytest.approx(-1.0, abs=1e-8)
+    assert system.A[y, y] == -1.0
     assert (len(system.bends), len(system.flats)) == (bends, flats)
     for limiter in [*system.bends, *system.flats]:
         assert limiter.instances == ["it"]
