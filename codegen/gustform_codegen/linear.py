@@ -33,7 +33,7 @@ _STEADY = 1e-6  # largest scaled residual, and share of nominal a second, that s
 _SINGULAR = 1e-14  # reciprocal condition of the equilibrated matrix below which index one is refused
 _AT_BEND = 1e-7  # distance from a bend, as a share of nominal, that counts as standing on it
 _ASIDE = 1e-6  # step to either side of a bend, as a share of nominal
-_REACHES = (0.01, 0.1, 0.1, 1.0, 1.0, 1.0, 10.0, 10.0)  # how far to look for the other parts of a limiter, of nominal
+_REACHES = (0.01, 0.1, 1.0, 10.0)  # how far to look for the other parts of a limiter, of nominal
 _JUMP = 1e-4  # change between both sides, as a share of the largest term of the equation, that is no curvature
 
 Ints = NDArray[np.int64]
@@ -160,12 +160,13 @@ class _Derivatives(TypeEvaluator):
         size, alive = self.y.numel(), np.zeros(entries.shape, bool)
         rng = np.random.default_rng(0)
         for reach in _REACHES:
-            elsewhere = [a.copy() for a in arguments]
-            shift = reach * nominal * rng.uniform(-1.0, 1.0, nominal.shape)
-            elsewhere[0] += shift[:size]
-            elsewhere[2] += shift[size:]
-            there = self.values(elsewhere)[1]
-            alive |= np.isfinite(there) & (there != 0.0)
+            direction = rng.choice((-1.0, 1.0), nominal.shape) * rng.uniform(0.5, 1.0, nominal.shape)
+            for side in (reach, -reach):
+                elsewhere = [a.copy() for a in arguments]
+                elsewhere[0] += side * (direction * nominal)[:size]
+                elsewhere[2] += side * (direction * nominal)[size:]
+                there = self.values(elsewhere)[1]
+                alive |= np.isfinite(there) & (there != 0.0)
         return np.logical_and(zero, alive)
 
     def _bent(self, values: Array, entries: Array, nominal: Array) -> NDArray[np.bool_]:
