@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import cmath
 import math
+from typing import Any
 
 import pytest
 
+from gustform.electrical.constant_field import ConstantField
 from gustform.electrical.dc_link import DcLink
 from gustform.electrical.dq import DqImpedance
+from gustform.electrical.first_order_governor import FirstOrderGovernor
 from gustform.electrical.machine6 import Machine6
+from gustform.electrical.machine_classical import ClassicalMachine
 from gustform.electrical.msc import MachineSideConverter
 from gustform.electrical.pmsg import Pmsg
 from gustform.electrical.sexs import SEXS
 from gustform.electrical.synchronous_generator import SynchronousGenerator
 from gustform.electrical.tgov1 import TGOV1
 from gustform.interfaces import DcPort, Shaft
-from gustform.language import Component, Input, Part
+from gustform.language import Component, GustformError, Input, Part
 from gustform.mechanical.one_mass import OneMass
 from tests.components.evaluate import evaluate
 
@@ -108,6 +112,102 @@ def test_exciter_order_and_ceiling(V_t: float, order: float) -> None:
     found = evaluate(SEXS(), {"V_t": V_t, "lead": 0.006, "E_fd": 1.3}, {"V_ref": 1.007})
     assert found["der(E_fd)"] == pytest.approx((order - 1.3) / 0.05, rel=1e-9)
     assert found["der(lead)"] == pytest.approx((1.007 - V_t - 0.006) / 10.0, rel=1e-9)
+
+
+@pytest.mark.parametrize("power", [0j, 0.4 + 0.1j, 0.9 - 0.3j])
+@pytest.mark.parametrize("lossless", [False, True])
+def test_classical_machine_is_a_voltage_behind_its_transient_reactance(power: complex, lossless: bool) -> None:
+    machine, voltage = ClassicalMachine(lossless=lossless, ra=0.02, xd1=0.28), cmath.rect(1.02, 0.1)
+    i = (power / voltage).conjugate()
+    inner = voltage + complex(0.0 if lossless else 0.02, 0.28) * i
+    rest = machine.rest(power, voltage)
+    assert cmath.rect(rest.E, rest.delta) == pytest.approx(inner, rel=ROUND_OFF)
+    v = voltage * cmath.exp(-1j * (rest.delta - cmath.pi / 2))
+    given = {"omega": 1.0, "frame": 1.0, "delta": rest.delta, "P_m": rest.P_m, "E_fd": 0.0}
+    found = evaluate(machine, given | {"stator.vd": v.real, "stator.vq": v.imag}, {"E": rest.E})
+    assert v * complex(found["i_d"], found["i_q"]).conjugate() == pytest.approx(power, abs=1e-12)
+    assert found["T_e"] == pytest.approx(power.real + (0.0 if lossless else 0.02) * abs(i) ** 2, abs=1e-12)
+    assert found["T_e"] == pytest.approx((inner * i.conjugate()).real, abs=1e-12)
+    assert found["der(omega)"] == pytest.approx(0.0, abs=1e-12)
+    assert found["V_t"] == pytest.approx(1.02, rel=ROUND_OFF)
+
+
+@pytest.mark.parametrize("machine", [Machine6(D=2.0), ClassicalMachine(D=2.0)])
+def test_damping_is_power_for_speed_off_nominal(machine: Machine6 | ClassicalMachine) -> None:
+    rest = machine.rest(0.5 + 0j, 1 + 0j)
+    states = ("E1q", "E1d", "psi_1d", "psi_2q") if isinstance(machine, Machine6) else ()
+    given = {name: getattr(rest, name) for name in ("delta", "P_m", "E_fd", *states)}
+    v = cmath.exp(-1j * (rest.delta - cmath.pi / 2))
+    given |= {"omega": 1.01, "frame": 1.0, "stator.vd": v.real, "stator.vq": v.imag}
+    found = evaluate(machine, given, {"E": rest.E_fd} if not states else None)
+    assert found["der(omega)"] == pytest.approx(-2.0 * 0.01 / (2.0 * 6.0 * 1.01), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("given", "wrong"),
+    [({"xd1": 0.1}, "xd1 must be at least xd2 = 0.23"), ({"xl": 0.23}, "xd2 must be above xl = 0.23"),
+     ({"xq": 0.6}, "xq must be at least xq1 = 0.65")],
+)  # fmt: skip
+def test_reactances_must_grow_from_the_leakage_to_the_synchronous_one(given: dict[str, float], wrong: str) -> None:
+    with pytest.raises(GustformError, match=f"GF2041: machine.{wrong}"):
+        SynchronousGenerator(machine=given).parameter_values()
+
+
+@pytest.mark.parametrize(("omega", "P_m"), [(1.0, 0.4), (0.99, 0.4), (1.2, 0.0)])
+def test_first_order_governor_is_the_papers(omega: float, P_m: float) -> None:
+    # T_g dP_g/dt = -P_g - k_g omega_g in deviations, k_g = 1/R
+    found = evaluate(FirstOrderGovernor(droop=0.04, T=3.0), {"omega": omega, "P_m": P_m}, {"P_ref": 0.4})
+    assert found["der(P_m)"] == pytest.approx((-(P_m - 0.4) - 25.0 * (omega - 1.0)) / 3.0, rel=1e-12, abs=1e-15)
+
+
+def test_constant_field_is_constant() -> None:
+    assert evaluate(ConstantField(), {"V_t": 0.7}, {"E_ref": 1.8})["E_fd"] == 1.8
+
+
+def kinds(generator: SynchronousGenerator) -> list[str]:
+    return [type(generator.part(name)).__name__ for name in ("machine", "governor", "exciter")]
+
+
+# What fidelity chooses, and what is given instead: a part, or parameters that one of the models only has.
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ({}, ["Machine6", "TGOV1", "SEXS"]),
+        ({"fidelity": "dq"}, ["Machine6", "TGOV1", "SEXS"]),
+        ({"fidelity": "lossless"}, ["ClassicalMachine", "FirstOrderGovernor", "ConstantField"]),
+        ({"fidelity": "lossless", "machine": {"H": 8.0}, "governor": {"droop": 0.04}, "exciter": {"V_start": 1.01}},
+         ["ClassicalMachine", "FirstOrderGovernor", "ConstantField"]),
+        ({"fidelity": "lossless", "machine": Machine6()}, ["Machine6", "FirstOrderGovernor", "SEXS"]),
+        ({"fidelity": "lossless", "machine": {"xd": 1.9}}, ["Machine6", "FirstOrderGovernor", "SEXS"]),
+        ({"fidelity": "lossless", "governor": TGOV1()}, ["ClassicalMachine", "TGOV1", "ConstantField"]),
+        ({"fidelity": "lossless", "governor": {"T1": 0.2}}, ["ClassicalMachine", "TGOV1", "ConstantField"]),
+        ({"fidelity": "lossless", "exciter": SEXS()}, ["Machine6", "FirstOrderGovernor", "SEXS"]),
+        ({"fidelity": "lossless", "exciter": {"K": 100.0}}, ["Machine6", "FirstOrderGovernor", "SEXS"]),
+        ({"machine": ClassicalMachine()}, ["ClassicalMachine", "TGOV1", "ConstantField"]),
+        ({"exciter": ConstantField()}, ["Machine6", "TGOV1", "ConstantField"]),
+    ],
+)  # fmt: skip
+def test_fidelity_chooses_what_is_not_given(given: dict[str, Any], expected: list[str]) -> None:
+    generator = SynchronousGenerator(**given)
+    assert kinds(generator) == expected
+    generator.parameter_values()  # everything given has a place there
+    # a changed parameter leaves the parts what they are
+    assert kinds(generator.with_value("governor.droop", 0.06)) == expected
+
+
+def test_lossless_leaves_out_every_resistance_that_is_given() -> None:
+    given: dict[str, Any] = {"machine": {"ra": 0.01}, "transformer": {"r": 0.02}}
+    losses = []
+    for fidelity in ("rms", "lossless"):
+        rest = SynchronousGenerator(fidelity=fidelity, P_start=0.5, Q_start=0.0, **given).rest()
+        losses.append(rest.P_m - 0.5)
+    assert losses == pytest.approx([0.03 * 0.25, 0.0], abs=1e-15)
+
+
+def test_exciter_without_effect_is_refused() -> None:
+    with pytest.raises(GustformError, match=r"GF2040: exciter must be ConstantField.*got SEXS.*try machine: Machine6"):
+        SynchronousGenerator(machine=ClassicalMachine(), exciter=SEXS())
+    SynchronousGenerator(machine=ClassicalMachine(), exciter=ConstantField(V_start=1.02))
 
 
 @pytest.mark.parametrize("rho", [-0.3, 0.0, 0.2, 0.7])

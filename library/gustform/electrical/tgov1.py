@@ -16,7 +16,11 @@ class TGOV1(Governor):
 
     pu of the machine's rating; time in s. The dead band stands before the gain 1/R. P_ref is found at a steady-state
     start so that the machine turns at `speed_start`.
-    Source: PSS/E model TGOV1; dead band and set A: project notes.
+
+    Inside the dead band nothing holds the frequency, and an eigenvalue is zero. For eigenvalues take set B: R 0.0613,
+    T1 0.3 s, T2 2.5 s, T3 8.4 s, no dead band, with H 8 s of the machine. The defaults are set A, for the time domain.
+
+    Source: PSS/E model TGOV1; dead band, sets A and B: project notes.
     """
 
     droop = Parameter("pu", "droop R: speed deviation for rated power", default=0.05, above=0.0)
