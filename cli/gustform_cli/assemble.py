@@ -17,7 +17,8 @@ from gustform.registry import UNITS, Unit
 from gustform_cli.components import Reader, entries
 from gustform_cli.document import Document, NodePath, dotted
 from gustform_cli.errors import ErrorList, did_you_mean
-from gustform_cli.scenario import ComponentEntry, ConstantWind, FileWind, Scenario, TurbulentWindBlock, validate
+from gustform_cli.scenario import ComponentEntry, Scenario, validate
+from gustform_cli.wind.blocks import ConstantWind, FileWind, TurbulentWindBlock
 from gustform_cli.wind.source import Reader as SeriesReader
 from gustform_cli.wind.source import WindSource, constant, csv_file, turbulence
 

@@ -7,99 +7,17 @@ finds, each with its place in the file.
 
 from __future__ import annotations
 
-import math
-import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    StrictBool,
-    StrictInt,
-    StrictStr,
-    ValidationError,
-    WithJsonSchema,
-)
-from pydantic_core import ErrorDetails, PydanticCustomError
+from pydantic import BaseModel, ConfigDict, Field, StrictInt, StrictStr, ValidationError
+from pydantic_core import ErrorDetails
 
 from gustform.language.errors import GustformError
 from gustform_cli.document import Document, NodePath, dotted
 from gustform_cli.errors import did_you_mean
-from gustform_cli.quantity import is_plain, parse_quantity
-
-NAME_PATTERN = r"^[A-Za-z_][A-Za-z0-9_]*$"
-QUANTITY_PATTERN = r"^\s*[+-]?[0-9.][0-9_.eE+-]*\s*\S.*$"
-
-
-# ---- field types ----------------------------------------------------------------------------------------------------
-def _refuse(code: str, message: str, hint: str = "") -> PydanticCustomError:
-    """An error of ours inside a pydantic validator; `validate` puts path and place to it."""
-    return PydanticCustomError(code, "{message}", {"message": message, "hint": hint})
-
-
-def _check_name(value: object) -> object:
-    if isinstance(value, str) and not re.match(NAME_PATTERN, value):
-        raise _refuse(
-            "GF2205",
-            f" must be a name of letters, digits and _, not beginning with a digit; got {value!r}",
-            re.sub(r"\W+", "_", value).strip("_") or "wt",
-        )
-    return value
-
-
-def _check_many(value: object) -> object:
-    if value == "turbines" or (isinstance(value, int) and not isinstance(value, bool) and value >= 1):
-        return value
-    raise _refuse("GF2003", f" must be a whole number from 1 on, or the word turbines; got {_shown(value)}", "1")
-
-
-def _quantity(
-    unit: str, *, above: float = -math.inf, low: float = -math.inf, high: float = math.inf
-) -> Callable[[object], float]:
-    def convert(value: object) -> float:
-        try:
-            number = parse_quantity(value, unit, "")
-        except GustformError as error:
-            raise _refuse(error.code, error.message, error.hint) from None
-        for wrong, bound in (
-            (number <= above, f"greater than {above:g}"),
-            (number < low, f"at least {low:g}"),
-            (number > high, f"at most {high:g}"),
-        ):
-            if wrong:
-                text = bound if is_plain(unit) else f"{bound} {unit}"
-                raise _refuse("GF2003", f" must be {text}; got {value}", f"a value {text}")
-        return number
-
-    return convert
-
-
-def _in(unit: str, example: str) -> dict[str, Any]:
-    """JSON schema of a quantity, for editors."""
-    if is_plain(unit):
-        return {"anyOf": [{"type": "number"}, {"type": "string", "pattern": r"%\s*$"}], "examples": [example]}
-    return {"type": "string", "pattern": QUANTITY_PATTERN, "examples": [example]}
-
-
-Name = Annotated[StrictStr, BeforeValidator(_check_name), WithJsonSchema({"type": "string", "pattern": NAME_PATTERN})]
-Moment = Annotated[float, BeforeValidator(_quantity("s", low=0.0)), WithJsonSchema(_in("s", "30 s"))]
-Duration = Annotated[float, BeforeValidator(_quantity("s", above=0.0)), WithJsonSchema(_in("s", "20 ms"))]
-Speed = Annotated[float, BeforeValidator(_quantity("m/s", low=0.5, high=100.0)), WithJsonSchema(_in("m/s", "8 m/s"))]
-Length = Annotated[float, BeforeValidator(_quantity("m", above=0.0)), WithJsonSchema(_in("m", "90 m"))]
-Tolerance = Annotated[float, BeforeValidator(_quantity("1", low=1e-12, high=1e-2)), WithJsonSchema(_in("1", "1e-6"))]
-# A number of things, or the word that stands for the scenario's number of turbines.
-Many = Annotated[
-    int | Literal["turbines"],
-    BeforeValidator(_check_many),
-    WithJsonSchema({"anyOf": [{"type": "integer", "minimum": 1}, {"const": "turbines"}]}),
-]
-
-
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=False)
+from gustform_cli.fields import Block, Duration, Many, Moment, Name, Tolerance, shown
+from gustform_cli.wind.blocks import WindBlock
 
 
 class ComponentEntry(BaseModel):
@@ -115,54 +33,7 @@ class ComponentEntry(BaseModel):
     aggregate: Many | None = Field(None, description="how many units this one stands for")
 
 
-class ConstantWind(_Part):
-    """Wind of one speed."""
-
-    type: Literal["constant"]
-    speed: Speed = Field(description="wind speed")
-
-
-class TurbulentWindBlock(_Part):
-    """IEC 61400-1 turbulence (Kaimal spectrum, normal turbulence model), made while running."""
-
-    type: Literal["turbulence"]
-    mean: Speed = Field(description="mean wind speed at hub height")
-    class_: Literal["A", "B", "C"] = Field("B", alias="class", description="turbulence class of IEC 61400-1")
-    seed: Annotated[StrictInt, Field(ge=0)] = Field(1, description="another seed, another wind of the same kind")
-    hub_height: Length = Field(90.0, description="gives the length scale of the turbulence")
-    every: Duration = Field(0.05, description="spacing of the samples")
-    rotor_effective: StrictBool = Field(True, description="averaged over the rotor, as a turbine feels it")
-    radius: Length | None = Field(None, description="rotor radius for the averaging; that of the turbine if left out")
-
-
-class WindColumns(_Part):
-    """Columns of a wind file by the names in its header."""
-
-    time: StrictStr = Field("time", description="column of the times, counted from the start of the run")
-    speed: StrictStr = Field("speed", description="column of the wind speeds")
-
-
-class WindUnits(_Part):
-    """Units the columns of a wind file are in."""
-
-    time: StrictStr = Field("s", description="unit of the times")
-    speed: StrictStr = Field("m/s", description="unit of the speeds")
-
-
-class FileWind(_Part):
-    """Rotor-effective wind from a CSV file whose first line names the columns."""
-
-    type: Literal["file"]
-    path: StrictStr = Field(description="the file, relative to the scenario")
-    columns: WindColumns = Field(default_factory=lambda: WindColumns.model_validate({}))
-    units: WindUnits = Field(default_factory=lambda: WindUnits.model_validate({}))
-    on_end: Literal["error", "hold"] = Field("error", description="when the file ends before the run")
-
-
-WindBlock = Annotated[ConstantWind | TurbulentWindBlock | FileWind, Field(discriminator="type")]
-
-
-class Event(_Part):
+class Event(Block):
     """Parameters that take new values at one moment."""
 
     at: Moment = Field(description="when")
@@ -171,7 +42,7 @@ class Event(_Part):
     )
 
 
-class Run(_Part):
+class Run(Block):
     """How long and how accurately."""
 
     until: Duration = Field(description="end of the simulated time")
@@ -185,7 +56,7 @@ class Run(_Part):
     max_step: Duration | None = Field(None, description="longest step of the solver")
 
 
-class Output(_Part):
+class Output(Block):
     """What is kept of a run."""
 
     every: Duration = Field(0.02, description="spacing of the rows in the result")
@@ -194,7 +65,7 @@ class Output(_Part):
     )
 
 
-class Scenario(_Part):
+class Scenario(Block):
     """A system, its wind, its events, and what to do with them."""
 
     name: StrictStr = Field(min_length=1, description="title, used in figures")
@@ -282,16 +153,11 @@ _SHAPES = {
 }
 
 
-def _shown(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
-
-
 def _translate(document: Document, plain: Mapping[str, Any], details: ErrorDetails) -> GustformError:
     """One of pydantic's errors in our words."""
     kind, loc, context = details["type"], details["loc"], details.get("ctx", {})
     path = _node_path(plain, loc)
-    name, got = dotted(path), _shown(details["input"])
+    name, got = dotted(path), shown(details["input"])
     place = document.place(path)
     if kind.startswith("GF"):
         key = loc[-1:] == ("[key]",)

@@ -14,9 +14,10 @@ from gustform.language.component import Component
 from gustform.language.declare import Parameter, Part, Table
 from gustform.registry import PARTS, UNITS, Unit
 from gustform_cli.catalogue import choices, part_types, short_names
+from gustform_cli.fields import NAME_PATTERN, QUANTITY_PATTERN
 from gustform_cli.info import default_text, range_text, sentence
 from gustform_cli.quantity import is_plain
-from gustform_cli.scenario import NAME_PATTERN, QUANTITY_PATTERN, Scenario
+from gustform_cli.scenario import Scenario
 
 FILE = Path(__file__).with_name("scenario.schema.json")
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gustform.language.errors import GustformError
 from gustform.language.system import Constant, Series
 from gustform_cli.quantity import conversion
-from gustform_cli.scenario import ConstantWind, FileWind, TurbulentWindBlock
+from gustform_cli.wind.blocks import ConstantWind, FileWind, TurbulentWindBlock
 from gustform_cli.wind.csv_file import CsvColumns, CsvWind, scan
 from gustform_cli.wind.kaimal import Kaimal, length_scale, standard_deviation
 from gustform_cli.wind.turbulence import TurbulentWind
