@@ -14,8 +14,12 @@ from types import MappingProxyType
 from gustform.aero.closed_form_rotor import ClosedFormRotor
 from gustform.aero.table_rotor import TableRotor, read_cp_table
 from gustform.control.curtailment_schedule import CurtailmentSchedule
+from gustform.control.droop import Droop
 from gustform.control.dual_port import DualPort
+from gustform.control.grid_following import GridFollowing
+from gustform.control.matching import Matching
 from gustform.control.schedule import FixedPoint
+from gustform.control.virtual_synchronous_machine import VirtualSynchronousMachine
 from gustform.electrical.bus import Bus
 from gustform.electrical.constant_field import ConstantField
 from gustform.electrical.constant_power_load import ConstantPowerLoad
@@ -87,15 +91,19 @@ PARTS: Mapping[str, Replacement] = MappingProxyType(
         "ClosedFormRotor": Replacement(ClosedFormRotor),
         "ConstantField": Replacement(ConstantField),
         "CurtailmentSchedule": Replacement(CurtailmentSchedule),
+        "Droop": Replacement(Droop),
         "DualPort": Replacement(DualPort),
         "FirstOrderGovernor": Replacement(FirstOrderGovernor),
         "FixedPoint": Replacement(FixedPoint),
+        "GridFollowing": Replacement(GridFollowing),
         "Machine6": Replacement(Machine6),
         "OneMass": Replacement(OneMass),
+        "Matching": Replacement(Matching),
         "SEXS": Replacement(SEXS),
         "TGOV1": Replacement(TGOV1),
         "TwoMass": Replacement(TwoMass),
         "TableRotor": Replacement(TableRotor, tables={"cp": read_cp_table}),
+        "VirtualSynchronousMachine": Replacement(VirtualSynchronousMachine),
     }
 )
 

@@ -9,6 +9,10 @@ import numpy as np
 from gustform.aero.closed_form_rotor import ClosedFormRotor, polynomial
 from gustform.aero.table_rotor import TableRotor
 from gustform.control.curtailment_schedule import CurtailmentSchedule
+from gustform.control.droop import Droop
+from gustform.control.grid_following import GridFollowing
+from gustform.control.matching import Matching
+from gustform.control.virtual_synchronous_machine import VirtualSynchronousMachine
 from gustform.electrical.bus import Bus
 from gustform.electrical.constant_field import ConstantField
 from gustform.electrical.constant_power_load import ConstantPowerLoad
@@ -128,11 +132,14 @@ SYSTEMS: dict[str, Callable[[], System]] = {
     "ConstantField": lambda: with_generator(exciter=ConstantField()),
     "ConstantPowerLoad": with_load,
     "CurtailmentSchedule": lambda: with_turbine(_turbine(schedule=CurtailmentSchedule(wind_source="estimated"))),
+    "Droop": lambda: with_turbine(_turbine(control=Droop())),
     "DualPort": lambda: with_turbine(_turbine()),
     "FirstOrderGovernor": lambda: with_generator(fidelity="lossless"),
     "FixedPoint": lambda: with_turbine(_turbine()),
+    "GridFollowing": lambda: with_turbine(_turbine(control=GridFollowing())),
     "Line": with_line,
     "Machine6": with_generator,
+    "Matching": lambda: with_turbine(_turbine(control=Matching())),
     "PmsgTurbine": lambda: with_turbine(_turbine()),
     "OneMass": lambda: with_turbine(_turbine()),
     "SEXS": with_generator,
@@ -143,6 +150,7 @@ SYSTEMS: dict[str, Callable[[], System]] = {
     "TwoMass": lambda: with_turbine(_turbine(drive=TwoMass())),
     "TableRotor": lambda: with_turbine(_turbine(rotor=TableRotor(cp=sampled_table()))),
     "Transformer": with_transformer,
+    "VirtualSynchronousMachine": lambda: with_turbine(_turbine(control=VirtualSynchronousMachine())),
 }
 
 # Units whose structure depends on a choice, as that choice makes them.

@@ -111,7 +111,7 @@ def test_stiff_frame_turns_at_its_speed() -> None:
 
 def test_grid_side_converter_is_a_voltage_behind_its_filter() -> None:
     v, e = cmath.rect(3.2e3, 0.02), cmath.rect(1.01 * 3.3e3, 0.15)
-    given = port("grid", v) | {"V": 1.01, "omega": 1.002, "frame": 0.998, "theta": 0.15, "dc.v": 8000.0}
+    given = port("grid", v) | {"V": 1.01, "omega": 1.002, "frame": 0.998, "theta": 0.15, "dc.v": 8000.0, "blocked": 0.0}
     found = evaluate(GridSideConverter(), given)
     i = (e - v) / (complex(0.01, 0.1) * 3.3e3**2 / 5e6)
     assert current(found, "grid") == pytest.approx(-i, rel=ROUND_OFF)

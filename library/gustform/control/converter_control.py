@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 from gustform.language import Component, Input, Output, Parameter
 
 
@@ -22,6 +24,8 @@ class ConverterControl(Component):
     pu: powers of the rating of one turbine; DC voltage of its nominal; grid side of V_n and f0; machine side of the
     machine's base voltage and speed.
     """
+
+    scheduled_pitch: ClassVar[bool] = False  # whether beta_del is held, or the speed limiter alone sets the pitch
 
     curtailment = Parameter(
         "1", "share of the available power held back, 1 - eta; 0 is maximum power", default=0.0, min=0.0, max=0.95

@@ -21,6 +21,8 @@ class DualPort(ConverterControl):
     Source: Lyu, Subotic, Gross 2022, IV-C, IV-D; T_dc = 0.002 s: project notes.
     """
 
+    scheduled_pitch = True
+
     K_gsc = Parameter("pu", "droop K_theta of the grid side", default=0.5, above=0.0)
     K_msc = Parameter("pu", "droop K_theta of the machine side", default=lambda self: self.K_gsc, min=0.0)
     K_d_gsc = Parameter("s", "derivative gain of the grid side", default=0.0067, min=0.0)

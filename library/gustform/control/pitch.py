@@ -24,9 +24,17 @@ class PitchControl(Component):
     omega_max = Parameter("pu", "speed above which the speed limiter acts", default=1.2, above=0.0)
     P_max = Parameter("pu", "power above which the power limiter acts", default=1.0, above=0.0)
     beta_start = Parameter("deg", "first guess of the pitch angle", default=0.0)
+    beta_limiter = Parameter("deg", "start of the integral of the speed limiter", default=0.0, min=0.0)
     T_P = Parameter("s", "time constant of the filter of the power", default=0.5, above=0.0)
 
-    speed_limiter = Part(PiLimiter, "limits the rotor speed", x_max=lambda self: self.omega_max, k_p=60.0, k_i=12.0)
+    speed_limiter = Part(
+        PiLimiter,
+        "limits the rotor speed",
+        x_max=lambda self: self.omega_max,
+        k_p=60.0,
+        k_i=12.0,
+        integral=lambda self: self.beta_limiter,
+    )
     power_limiter = Part(PiLimiter, "limits the power", x_max=lambda self: self.P_max, k_p=1.0, k_i=2.0)
     servo = Part(PitchServo, "pitch actuator", beta=lambda self: self.beta_start)
 

@@ -7,21 +7,27 @@ from typing import Any
 
 from gustform.electrical.grid_side import GridSide
 from gustform.electrical.gsc import GridSideConverter
+from gustform.electrical.gsc_current import GridSideCurrent
 from gustform.electrical.machine_side import MachineSide
 from gustform.electrical.msc import MachineSideConverter
+from gustform.electrical.msc_power import MachineSidePower
 from gustform.electrical.permanent_magnet import PermanentMagnetMachine
 from gustform.electrical.pmsg import Pmsg
+from gustform.electrical.pmsg_dq import PmsgDq
 from gustform.language import GustformError, Output
 
 # What is imposed (the command that tells it) and the fidelity -> the model.
 _GRID_SIDE: Mapping[tuple[str, str], type[GridSide]] = {
     ("V_gsc", "rms"): GridSideConverter,
+    ("i_d_gsc", "rms"): GridSideCurrent,
 }
 _MACHINE_SIDE: Mapping[tuple[str, str], type[MachineSide]] = {
     ("V_msc", "rms"): MachineSideConverter,
+    ("P_msc", "rms"): MachineSidePower,
 }
 _MACHINE: Mapping[tuple[str, str], type[PermanentMagnetMachine]] = {
     ("V_msc", "rms"): Pmsg,
+    ("P_msc", "rms"): PmsgDq,
 }
 
 GRID_SIDES = tuple(_GRID_SIDE.values())

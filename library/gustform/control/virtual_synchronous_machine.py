@@ -1,0 +1,49 @@
+"""Virtual synchronous machine on the grid side, DC voltage held by the machine side."""
+
+from __future__ import annotations
+
+from gustform.control.grid_forming import GridForming
+from gustform.control.msc_dc_voltage import MscDcVoltage
+from gustform.language import Input, Parameter, Part, Variable
+
+
+class VirtualSynchronousMachine(GridForming):
+    """Grid-forming control by the swing equation of a virtual machine.
+
+        2 H d(omega_gsc)/dt = P* - P_gsc - (omega_gsc - 1)/m_p - D (omega_gsc - omega_f)
+        T_f d(omega_f)/dt   = omega_gsc - omega_f
+        V_gsc = V* + K_q (Q* - Q_f)
+        P_msc = PI(v_dc* - v_dc)              within 0 and the limit of the machine side
+
+    D damps swings against the slow frequency omega_f and does not change the droop; in the source a PLL gives that
+    frequency, here it is the machine's own, filtered. The grid side assumes that the DC voltage is held. pu as in
+    ConverterControl; time in s.
+    Source: D'Arco, Suul, Fosso, A virtual synchronous machine implementation for distributed control of power
+    converters in smart grids, Electr. Power Syst. Res. 122 (2015); Lyu, Subotic, Gross 2022, III-B. Values: ours.
+    """
+
+    H = Parameter("s", "inertia constant of the virtual machine", default=2.0, above=0.0)
+    D = Parameter("pu", "damping against the filtered frequency", default=100.0, min=0.0)
+    T_f = Parameter("s", "time constant of the filter of the frequency", default=0.5, above=0.0)
+
+    P_gsc = Input("pu", "active power out of the grid-side converter", start=0.5)
+    omega_f = Variable("pu", "filtered frequency", start=1.0)
+
+    dc_voltage = Part(
+        MscDcVoltage,
+        "DC voltage, held by the machine side",
+        v_dc_ref=lambda self: self.v_dc_ref,
+        P_max=lambda self: self.P_max,
+    )
+
+    def equations(self) -> None:
+        super().equations()
+        omega = self.omega_gsc
+        self.eq(
+            2.0 * self.H * self.der(omega),
+            self.P_ref - self.P_gsc - (omega - 1.0) / self.droop - self.D * (omega - self.omega_f),
+        )
+        self.eq(self.T_f * self.der(self.omega_f), omega - self.omega_f)
+        self.connect(self.dc_voltage.v_dc, self.v_dc)
+        self.connect(self.dc_voltage.omega_r, self.omega_r)
+        self.connect(self.P_msc, self.dc_voltage.P)
