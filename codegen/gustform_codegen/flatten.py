@@ -311,9 +311,15 @@ class _Flattener:
         return tears
 
     def is_constant(self, expression: Any) -> bool:
-        """Whether it depends on parameters and numbers only, so that it cannot pass through zero during a run."""
-        known = self.e.symbols
-        return all(k in known and known[k].kind == "parameter" for k in keys_in(expression))
+        """Whether it depends on parameters and numbers only, so that it cannot pass through zero during a run, and does
+        not vanish with those that may be zero."""
+        symbols = ca.symvar(expression)
+        known = [self.e.symbols.get(key_of(s)) for s in symbols]
+        if not all(s is not None and s.kind == "parameter" for s in known):
+            return False
+        at_zero = [x for x, s in zip(symbols, known, strict=True) if s is not None and _may_be_zero(s.declaration)]
+        rest = ca.substitute(expression, ca.vertcat(*at_zero), ca.SX.zeros(len(at_zero))) if at_zero else expression
+        return not ca.simplify(rest).is_zero()
 
     # ---- the result ----
     def collect(
@@ -474,6 +480,11 @@ class _Flattener:
             assign = [(discrete_index[key_of(t)], self._final(v, solution)) for t, v in when.assign]
             clauses.append(WhenClause(root, period, assign, reinit, text))
         return roots, clauses
+
+
+def _may_be_zero(parameter: Any) -> bool:
+    """Whether a parameter is declared to be 0 at times, by a bound at or below it."""
+    return parameter.above is None and parameter.min is not None and bool(parameter.min <= 0.0)
 
 
 def flatten(

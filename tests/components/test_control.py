@@ -14,7 +14,7 @@ from gustform.language import Component
 from gustform.turbines.pmsg_turbine import PmsgTurbine
 from tests.components.evaluate import evaluate
 
-GSC = {"v_dc": 1.0, "Q": 0.0, "xi": 0.0, "Q_filtered": 0.0}
+GSC = {"v_dc": 1.0, "dv_dc": 0.0, "Q": 0.0, "xi": 0.0, "Q_filtered": 0.0}
 MSC = GSC | {"omega_del": 1.16}
 
 
@@ -48,6 +48,16 @@ def test_voltage_droop_and_filter_of_the_reactive_power() -> None:
     assert found["V"] == pytest.approx(1.0 + 0.02 * (0.05 - 0.1), rel=1e-12)
     assert found["der(Q_filtered)"] == pytest.approx((0.3 - 0.1) / 0.05, rel=1e-12)
     assert found["omega"] == 1.0
+
+
+def test_lossless_form_is_a_pd_of_the_dc_voltage_at_constant_ac_voltage() -> None:
+    at = {"v_dc": 1.02, "dv_dc": -0.4, "Q": 0.3}
+    found = evaluate(DualPortGsc(lossless=True, K_theta=0.5, K_d=0.0067), at, {"Q_ref": 0.1})
+    assert found["omega"] == pytest.approx(1.0 + 0.5 * 0.02 - 0.0067 * 0.4, rel=1e-12)
+    assert found["V"] == 1.0
+    found = evaluate(DualPortMsc(lossless=True, K_theta=15.0, K_d=0.2), at | {"omega_del": 1.16}, {"V_ref": 0.93})
+    assert found["omega"] == pytest.approx(1.16 + 15.0 * 0.02 - 0.2 * 0.4, rel=1e-12)
+    assert found["V"] == 0.93
 
 
 def test_both_sides_share_the_ratio_of_their_gains() -> None:

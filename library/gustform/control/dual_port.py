@@ -23,6 +23,9 @@ class DualPort(ConverterControl):
 
     scheduled_pitch = True
 
+    lossless = Parameter(
+        "1", "the paper's analysis: no filter of the DC voltage, constant AC voltages", default=False, structural=True
+    )
     K_gsc = Parameter("pu", "droop K_theta of the grid side", default=0.5, above=0.0)
     K_msc = Parameter("pu", "droop K_theta of the machine side", default=lambda self: self.K_gsc, min=0.0)
     K_d_gsc = Parameter("s", "derivative gain of the grid side", default=0.0067, min=0.0)
@@ -39,6 +42,7 @@ class DualPort(ConverterControl):
         "pu", "largest frequency deviation the gains are designed for", default=0.01, above=0.0
     )
 
+    dv_dc = Input("1/s", "rate of change of the DC voltage in pu/s, read by the lossless form only")
     Q_gsc = Input("pu", "reactive power delivered by the grid-side converter")
     Q_msc = Input("pu", "reactive power delivered by the machine-side converter")
     omega_del = Input("pu", "rotor speed at the operating point, base of the rotor speed", start=1.2)
@@ -49,6 +53,7 @@ class DualPort(ConverterControl):
     gsc = Part(
         DualPortGsc,
         "grid side",
+        lossless=lambda self: self.lossless,
         K_theta=lambda self: self.K_gsc,
         K_d=lambda self: self.K_d_gsc,
         K_q=lambda self: self.K_q_gsc,
@@ -60,6 +65,7 @@ class DualPort(ConverterControl):
     msc = Part(
         DualPortMsc,
         "machine side",
+        lossless=lambda self: self.lossless,
         K_theta=lambda self: self.K_msc,
         K_d=lambda self: self.K_d_msc,
         K_q=lambda self: self.K_q_msc,
@@ -71,6 +77,8 @@ class DualPort(ConverterControl):
     def equations(self) -> None:
         self.connect(self.v_dc, self.gsc.v_dc)
         self.connect(self.v_dc, self.msc.v_dc)
+        self.connect(self.dv_dc, self.gsc.dv_dc)
+        self.connect(self.dv_dc, self.msc.dv_dc)
         self.connect(self.omega_del, self.msc.omega_del)
         self.connect(self.Q_gsc, self.gsc.Q)
         self.connect(self.Q_msc, self.msc.Q)

@@ -17,11 +17,18 @@ class DualPortGsc(Component):
         omega = omega_0 + K_theta xi + K_d d(xi)/dt
         T_v d(Q_f)/dt = Q - Q_f
 
+    `lossless`, the form of the paper's analysis: T_dc = 0 and a constant voltage, so that no state is left:
+
+        omega = omega_0 + K_theta (v_dc - v_dc*) + K_d d(v_dc)/dt          V = V*
+
     pu: base f0, nominal voltages, rating of the turbine; time in s; Q delivered. Q* is found at a steady-state start so
     that V = V*. Stable for T_dc < K_d/K_theta only (project notes): the published T_dc = 0.05 s is not.
-    Source: Lyu, Subotic, Gross 2022, eqs. (7), (8).
+    Source: Lyu, Subotic, Gross 2022, eqs. (7), (8); V-A for the analysis.
     """
 
+    lossless = Parameter(
+        "1", "the paper's analysis: no filter of the DC voltage, constant AC voltage", default=False, structural=True
+    )
     omega_0 = Parameter("pu", "nominal frequency", default=1.0, above=0.0)
     K_theta = Parameter("pu", "droop of the frequency with the DC voltage", default=0.5, above=0.0)
     K_d = Parameter("s", "derivative gain, pu frequency for 1 pu/s of DC voltage", default=0.0067, min=0.0)
@@ -33,6 +40,7 @@ class DualPortGsc(Component):
     Q_ref = Parameter("pu", "reactive power set point Q*, found at the start", free=True, start=0.0)
 
     v_dc = Input("pu", "DC voltage", start=1.0)
+    dv_dc = Input("1/s", "rate of change of the DC voltage in pu/s, read by the lossless form only")
     Q = Input("pu", "reactive power delivered")
     omega = Output("pu", "frequency of the converter's voltage", start=1.0)
     V = Output("pu", "magnitude of the converter's voltage", start=1.0)
@@ -40,9 +48,15 @@ class DualPortGsc(Component):
     Q_filtered = Variable("pu", "filtered reactive power Q_f")
 
     def equations(self) -> None:
-        slope = (self.v_dc - self.v_dc_ref - self.xi) / self.T_dc
-        self.eq(self.der(self.xi), slope)
+        if self.lossless:
+            slope = self.dv_dc
+            self.eq(self.xi, self.v_dc - self.v_dc_ref)
+            self.eq(self.Q_filtered, self.Q)
+            self.eq(self.V, self.V_ref)
+        else:
+            slope = (self.v_dc - self.v_dc_ref - self.xi) / self.T_dc
+            self.eq(self.der(self.xi), slope)
+            self.eq(self.T_v * self.der(self.Q_filtered), self.Q - self.Q_filtered)
+            self.eq(self.V, self.V_ref + self.K_q * (self.Q_ref - self.Q_filtered))
         self.eq(self.omega, self.omega_0 + self.K_theta * self.xi + self.K_d * slope)
-        self.eq(self.T_v * self.der(self.Q_filtered), self.Q - self.Q_filtered)
-        self.eq(self.V, self.V_ref + self.K_q * (self.Q_ref - self.Q_filtered))
-        self.initial(self.V, self.V_ref)
+        self.initial(self.Q, self.Q_ref)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import casadi as ca
 
 from gustform.conventions import NOMINAL_FREQUENCY, TWO_PI
@@ -20,6 +22,7 @@ class GridSide(Component):
     nominal voltage. Ports in V and A. Source: Lyu, Subotic, Gross 2022, II-B, eq. (3).
     """
 
+    lossless = Parameter("1", "whether the filter's resistance is left out", default=False, structural=True)
     rating = Parameter("VA", "base S_b of r and x", default=5e6, above=0.0)
     voltage = Parameter("V", "nominal line-to-line RMS voltage V_b", default=3.3e3, above=0.0)
     f0 = Parameter("Hz", "nominal frequency", default=NOMINAL_FREQUENCY, above=0.0)
@@ -40,10 +43,19 @@ class GridSide(Component):
     P = Variable("W", "active power out of the converter", start=1e6, nominal=1e6)
     Q = Variable("var", "reactive power out of the converter", nominal=1e6)
 
+    @property
+    def resistance(self) -> Any:
+        """The filter's resistance that counts, pu."""
+        return 0.0 if self.lossless else self.r
+
     def equations(self) -> None:
+        self.eq(self.der(self.theta), TWO_PI * self.f0 * (self.omega - self.frame))
+        self.eq(self.dc.i, self.P / self.dc.v)
+        self.port_equations()
+
+    def port_equations(self) -> None:
+        """Between the phasors of the port and the converter's own frame."""
         v = self.grid
         c, s = ca.cos(self.theta), ca.sin(self.theta)
-        self.eq(self.der(self.theta), TWO_PI * self.f0 * (self.omega - self.frame))
         self.eq(self.v_d, (v.vr * c + v.vi * s) / self.voltage)
         self.eq(self.v_q, (v.vi * c - v.vr * s) / self.voltage)
-        self.eq(self.dc.i, self.P / self.dc.v)

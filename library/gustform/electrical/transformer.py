@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from gustform.interfaces import AcPort
 from gustform.language import Component, Parameter
 
@@ -16,6 +18,7 @@ class Transformer(Component):
     Source: Kundur, Power System Stability and Control, 1994, 6.2.
     """
 
+    lossless = Parameter("1", "whether the series resistance is left out", default=False, structural=True)
     rating = Parameter("VA", "rated apparent power S_n, base of r and x", default=5e6, above=0.0)
     voltage_primary = Parameter("V", "nominal line-to-line RMS voltage V_p", default=3.3e3, above=0.0)
     voltage_secondary = Parameter("V", "nominal line-to-line RMS voltage V_s", default=33e3, above=0.0)
@@ -37,8 +40,13 @@ class Transformer(Component):
         p, s = self.primary, self.secondary
         ratio = self.voltage_secondary / self.voltage_primary
         Z_b = self.voltage_secondary * self.voltage_secondary / self.rating
-        R, X = self.r * Z_b, self.x * Z_b
+        R, X = (0.0 if self.lossless else self.r * Z_b), self.x * Z_b
         self.eq(p.ir + ratio * s.ir, 0)
         self.eq(p.ii + ratio * s.ii, 0)
+        self.branch(ratio, R, X)
+
+    def branch(self, ratio: Any, R: Any, X: Any) -> None:
+        """Current and voltage of the series impedance R + jX of the secondary side."""
+        p, s = self.primary, self.secondary
         self.eq(ratio * p.vr - s.vr, X * s.ii - R * s.ir)
         self.eq(ratio * p.vi - s.vi, -X * s.ir - R * s.ii)

@@ -7,7 +7,6 @@ from gustform.aero.rotor import Rotor
 from gustform.control.converter_control import ConverterControl
 from gustform.control.curtailment_schedule import CurtailmentSchedule, observer_table, pitch_table, speed_table
 from gustform.control.dual_port import DualPort
-from gustform.control.grid_following import GridFollowing
 from gustform.control.operating_point import (
     DualPortGains,
     Limits,
@@ -29,6 +28,7 @@ from gustform.electrical.parallel_units import ParallelUnits
 from gustform.electrical.permanent_magnet import PermanentMagnetMachine
 from gustform.electrical.pmsg import Pmsg
 from gustform.electrical.transformer import Transformer
+from gustform.electrical.transformer_dq import TransformerDq
 from gustform.interfaces import AcPort
 from gustform.language import Component, Input, Output, Parameter, Part, Variable
 from gustform.mechanical.drive_train import DriveTrain
@@ -105,6 +105,8 @@ class PmsgTurbine(Component):
         rating=lambda self: self.rating,
         voltage=lambda self: self.voltage_converter,
         omega_base=lambda self: self.omega_base,
+        stator_dynamics=lambda self: self.fidelity == "dq",
+        i_q=lambda self: self.power_start() / (self.omega_del * self.pmsg.psi),
     )
     msc = Part(
         MachineSideConverter,
@@ -114,6 +116,11 @@ class PmsgTurbine(Component):
         among=stages.MACHINE_SIDES,
         rating=lambda self: self.rating,
         voltage=lambda self: self.voltage_converter,
+        omega_base=lambda self: self.omega_base,
+        pole_pairs=lambda self: self.pmsg.pole_pairs,
+        psi=lambda self: self.pmsg.psi,
+        L=lambda self: self.pmsg.L,
+        r=lambda self: self.pmsg.r,
     )
     dc_link = Part(DcLink, "DC link", voltage=lambda self: self.v_dc_base)
     gsc = Part(
@@ -122,13 +129,20 @@ class PmsgTurbine(Component):
         base=GridSide,
         select=stages.grid_side,
         among=stages.GRID_SIDES,
+        lossless=lambda self: self.fidelity == "lossless",
         rating=lambda self: self.rating,
         voltage=lambda self: self.voltage_converter,
         f0=lambda self: self.f0,
+        i_fd=lambda self: self.power_start(),
     )
     transformer = Part(
         Transformer,
         "turbine transformer",
+        base=Transformer,
+        select=stages.transformer,
+        among=(TransformerDq,),
+        lossless=lambda self: self.fidelity == "lossless",
+        f0=lambda self: self.f0,
         rating=lambda self: self.rating,
         voltage_primary=lambda self: self.voltage_converter,
         voltage_secondary=lambda self: self.voltage,
@@ -138,18 +152,17 @@ class PmsgTurbine(Component):
         Line,
         "line to the grid port",
         voltage=lambda self: self.voltage,
-        R=lambda self: self.r_line * self.voltage * self.voltage / self.rating,
-        X=lambda self: self.x_line * self.voltage * self.voltage / self.rating,
+        R=lambda self: 0.0 if self.fidelity == "lossless" else self.r_line * self.voltage**2 / self.rating,
+        X=lambda self: self.x_line * self.voltage**2 / self.rating,
     )
     units = Part(ParallelUnits, "turbines in parallel", n=lambda self: self.aggregate)
     control = Part(
         DualPort,
         "control of both converters",
         base=ConverterControl,
-        among=(DualPort, GridFollowing),
+        lossless=lambda self: self.fidelity == "lossless",
         curtailment=lambda self: self.curtailment,
         K_msc=lambda self: self.K_msc,
-        k_opt=lambda self: self.power_start() / self.omega_del**3,
     )
     schedule = Part(
         FixedPoint,
@@ -157,7 +170,7 @@ class PmsgTurbine(Component):
         base=OperatingSchedule,
         among=(FixedPoint, CurtailmentSchedule),
         omega_point=lambda self: self.omega_del,
-        beta_point=lambda self: self.beta_del - self.pitch_of_limiter(),
+        beta_point=lambda self: self.beta_del,
         wind_point=lambda self: self.wind_speed,
         curtailment=lambda self: self.control.curtailment,
         omega_max=lambda self: self.omega_max,
@@ -175,11 +188,11 @@ class PmsgTurbine(Component):
         K_p=lambda self: self.K_p,
         omega_max=lambda self: self.omega_max,
         beta_min=lambda self: self.beta_min,
-        beta_limiter=lambda self: self.pitch_of_limiter(),
         P_filtered=lambda self: self.power_start(),
     )
 
     v_dc = Variable("pu", "DC voltage, base v_dc_base", start=1.0)
+    dv_dc = Variable("1/s", "rate of change of the DC voltage in pu/s, base v_dc_base")
     omega_r = Variable("pu", "rotor speed, base omega_base", start=1.2)
     beta = Variable("deg", "pitch angle", nominal=10.0)
     frequency = Variable("Hz", "frequency of the GSC voltage", start=NOMINAL_FREQUENCY, nominal=NOMINAL_FREQUENCY)
@@ -193,7 +206,6 @@ class PmsgTurbine(Component):
     P = Variable("W", "active power of all turbines, delivered at the port", start=1e6, nominal=1e6)
     Q = Variable("var", "reactive power of all turbines, delivered at the port", nominal=1e6)
     omega_gsc = Output("pu", "frequency of the GSC voltage, base f0", start=1.0)
-    tripped = Output("1", "1 after the DC voltage has collapsed: the converters are blocked")
 
     def limits(self) -> Limits:
         """What bounds the operation of this turbine."""
@@ -214,12 +226,6 @@ class PmsgTurbine(Component):
             return DualPortGains(0.0, 0.0, float("inf"))
         return dual_port_gains(self.operating_point(), control.K_gsc, control.frequency_reserve)
 
-    def pitch_of_limiter(self) -> float:
-        """What of beta_del the integral of the speed limiter gives at the start, deg; the schedule gives the rest."""
-        if self.control.scheduled_pitch or not isinstance(self.schedule, FixedPoint):
-            return 0.0
-        return max(self.beta_del - self.beta_min, 0.0)
-
     def equations(self) -> None:
         rotor, drive, pmsg, msc, gsc = self.rotor, self.drive, self.pmsg, self.msc, self.gsc
         control, schedule, pitch = self.control, self.schedule, self.pitch
@@ -236,6 +242,7 @@ class PmsgTurbine(Component):
         self.connect(self.units.all, self.grid)
         # measurements, pu
         self.eq(self.v_dc, self.dc_link.v / self.v_dc_base)
+        self.eq(self.dv_dc, self.der(self.dc_link.v) / self.v_dc_base)
         self.eq(self.omega_r, drive.w / self.omega_base)
         self.eq(self.P_wt, rotor.P / self.rating)
         self.eq(self.P_pmsg, msc.P / self.rating)
@@ -244,7 +251,6 @@ class PmsgTurbine(Component):
         self.eq(self.Q_msc, msc.Q / self.rating)
         self.connect(self.v_d, gsc.v_d)
         self.connect(self.v_q, gsc.v_q)
-        self.connect(self.tripped, self.dc_link.tripped)
         # operating point
         self.connect(schedule.wind, self.wind)
         self.connect(schedule.omega_r, self.omega_r)
@@ -253,6 +259,7 @@ class PmsgTurbine(Component):
         # control: what it reads, by name; what it commands, by the name of the converter's input
         measured = {
             "v_dc": self.v_dc,
+            "dv_dc": self.dv_dc,
             "omega_r": self.omega_r,
             "P_pmsg": self.P_pmsg,
             "P_gsc": self.P_gsc,
@@ -263,7 +270,6 @@ class PmsgTurbine(Component):
             "omega_del": schedule.omega_del,
             "beta_del": schedule.beta_del,
             "wind": self.wind,
-            "blocked": self.tripped,
         }
         for name in control.declared(Input):
             self.connect(getattr(control, name), measured[name])

@@ -7,27 +7,32 @@ from typing import Any
 
 from gustform.electrical.grid_side import GridSide
 from gustform.electrical.gsc import GridSideConverter
-from gustform.electrical.gsc_current import GridSideCurrent
+from gustform.electrical.gsc_voltage_dq import GridSideVoltageDq
 from gustform.electrical.machine_side import MachineSide
 from gustform.electrical.msc import MachineSideConverter
-from gustform.electrical.msc_power import MachineSidePower
+from gustform.electrical.msc_voltage_dq import MachineSideVoltageDq
 from gustform.electrical.permanent_magnet import PermanentMagnetMachine
 from gustform.electrical.pmsg import Pmsg
 from gustform.electrical.pmsg_dq import PmsgDq
+from gustform.electrical.transformer import Transformer
+from gustform.electrical.transformer_dq import TransformerDq
 from gustform.language import GustformError, Output
 
 # What is imposed (the command that tells it) and the fidelity -> the model.
 _GRID_SIDE: Mapping[tuple[str, str], type[GridSide]] = {
+    ("V_gsc", "lossless"): GridSideConverter,
     ("V_gsc", "rms"): GridSideConverter,
-    ("i_d_gsc", "rms"): GridSideCurrent,
+    ("V_gsc", "dq"): GridSideVoltageDq,
 }
 _MACHINE_SIDE: Mapping[tuple[str, str], type[MachineSide]] = {
+    ("V_msc", "lossless"): MachineSideConverter,
     ("V_msc", "rms"): MachineSideConverter,
-    ("P_msc", "rms"): MachineSidePower,
+    ("V_msc", "dq"): MachineSideVoltageDq,
 }
 _MACHINE: Mapping[tuple[str, str], type[PermanentMagnetMachine]] = {
+    ("V_msc", "lossless"): Pmsg,
     ("V_msc", "rms"): Pmsg,
-    ("P_msc", "rms"): PmsgDq,
+    ("V_msc", "dq"): PmsgDq,
 }
 
 GRID_SIDES = tuple(_GRID_SIDE.values())
@@ -48,6 +53,11 @@ def machine_side(turbine: Any) -> type[MachineSide]:
 def machine(turbine: Any) -> type[PermanentMagnetMachine]:
     """The generator of a turbine."""
     return _find(_MACHINE, turbine)
+
+
+def transformer(turbine: Any) -> type[Transformer]:
+    """The transformer of a turbine: with a current of its own where the converter's filter has a capacitor."""
+    return TransformerDq if turbine.fidelity == "dq" else Transformer
 
 
 def _find(models: Mapping[tuple[str, str], type[Any]], turbine: Any) -> type[Any]:

@@ -704,3 +704,27 @@ def test_discretes_and_inputs_can_be_recorded() -> None:
     assert unit.substituted == 1
     wired = flatten(Kept(), signals=frozenset({"u"}))
     assert {r.path for r in wired.recorded} == {"d", "y"}  # a wired input is the other unit's unknown
+
+
+class Divider(Component):
+    """1 over a reactance X, then R + jX to ground: the voltage a + jb between them, the current c + jd."""
+
+    R = Parameter("1", "resistance", default=0.0, min=0.0)
+    X = Parameter("1", "reactance", default=4.0, above=0.0)
+    a = Variable("1", "a")
+    b = Variable("1", "b")
+    c = Variable("1", "c")
+    d = Variable("1", "d")
+
+    def equations(self) -> None:
+        self.eq(self.a, self.R * self.c - self.X * self.d)
+        self.eq(self.b, self.R * self.d + self.X * self.c)
+        self.eq(1 - self.a, -self.X * self.d)
+        self.eq(-self.b, self.X * self.c)
+
+
+def test_a_parameter_that_may_be_zero_divides_nothing() -> None:
+    component = Divider()
+    point = solved_point(flatten(component), component)
+    # half of the voltage, 1/(8j)
+    assert [point[name] for name in "abcd"] == [0.5, 0.0, 0.0, -0.125]
