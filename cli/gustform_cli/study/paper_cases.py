@@ -86,10 +86,10 @@ class Built:
         return turbine
 
 
-def build(case: Case, fidelity: str, more: Sequence[str] = ()) -> Built:
-    """Build a case, with further overrides; kernels come from the cache."""
+def build(case: Case, fidelity: str) -> Built:
+    """Build a case; kernels come from the cache."""
     begin = time.perf_counter()
-    assembled = load(SCENARIO, [*case.overrides(fidelity), *more])
+    assembled = load(SCENARIO, case.overrides(fidelity))
     model = link(assembled)
     try:
         table = steady_state(model.built.linked).table.with_channels(model.channels)

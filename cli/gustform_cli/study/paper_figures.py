@@ -18,6 +18,7 @@ from gustform_cli.figures import BLUE, DARK, GREEN, GREY, ORANGE, RED, STYLE
 from gustform_cli.png import save
 from gustform_cli.run_data import RunData
 from gustform_cli.study.paper_cases import CONTROLS, GFL, GFM_FR, GFM_MPPT, Case, Control
+from gustform_cli.study.paper_tables import Frequency
 from gustform_codegen.modes import CONSTANT, REFERENCE, Modes
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ _LINES: Mapping[Control, Mapping[str, Any]] = {
 }
 _MARKERS = {8: "o", 10: "s", 12: "^"}  # wind speeds, m/s
 _BEFORE = 5.0  # s shown before the step
-_SLOW = (-1.6, 5.9)  # real and imaginary part, 1/s: the corner of the second panel of eigenvalues
+_SLOW = (-1.7, 5.9)  # real and imaginary part, 1/s: the corner of the second panel of eigenvalues
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,7 @@ _PANELS = (
 _SAME_SCALE = ("sg.frequency", "wt.frequency")
 
 
-def case_figure(wind: int, results: Mapping[Case, Path], nadirs: Mapping[Case, float], file: Path) -> Path:
+def case_figure(wind: int, results: Mapping[Case, Path], frequency: Frequency, file: Path) -> Path:
     """The panels (a)-(f) at one wind speed, m/s, from the result files of its cases."""
     cases = [case for case in results if case.wind == wind]
     figure = _figure(8.6, 7.3)
@@ -77,11 +78,13 @@ def case_figure(wind: int, results: Mapping[Case, Path], nadirs: Mapping[Case, f
     low, high = min(axis.get_ylim()[0] for axis in same), max(axis.get_ylim()[1] for axis in same)
     for axis in same:
         axis.set_ylim(low, high)
+    low, high = axes[0, 0].get_ylim()
+    axes[0, 0].set_ylim(low, high + 0.14 * (high - low))  # room for the words above the curves
     axes[0, 0].annotate(
         "+20 MW load", (step, 1.0), xycoords=("data", "axes fraction"), xytext=(4, -2), textcoords="offset points",
         va="top", fontsize=8.5, color="#555555",
     )  # fmt: skip
-    _write_nadirs(axes[1, 0], cases, nadirs)
+    _write_nadirs(axes[1, 0], cases, frequency)
     for axis in axes[-1]:
         axis.set_xlabel("time (s)")
     _heading(figure, f"20 MW load step at {wind} m/s", cases, axes[0, 0])
@@ -119,7 +122,7 @@ def eigenvalue_figure(found: Mapping[Case, Modes], file: Path) -> Path:
         axis.axvline(0.0, color=DARK, linewidth=0.9, zorder=1)
         axis.axvspan(0.0, axis.get_xlim()[1], color=RED, alpha=0.12, linewidth=0.0, zorder=0)
         axis.set_xlim(axis.get_xlim())
-    _heading(figure, "Eigenvalues before the load step", list(found), None)
+    _heading(figure, "Eigenvalues", list(found), None)
     return save(figure, file)
 
 
@@ -139,11 +142,14 @@ def _keep_height(axis: Axes, least: float) -> None:
         axis.set_ylim(bottom, bottom + least)
 
 
-def _write_nadirs(axis: Axes, cases: Sequence[Case], nadirs: Mapping[Case, float]) -> None:
+def _write_nadirs(axis: Axes, cases: Sequence[Case], frequency: Frequency) -> None:
     """The nadirs in the colours of their curves, where the curves leave room."""
     for row, case in enumerate(cases):
+        nadir = frequency[case.control.key][str(case.wind)]["nadir_hz"]
+        if nadir is None:
+            continue
         axis.text(
-            0.985, 0.91 - 0.105 * row, f"nadir {nadirs[case]:.3f} Hz", transform=axis.transAxes, ha="right",
+            0.985, 0.91 - 0.105 * row, f"nadir {nadir:.3f} Hz", transform=axis.transAxes, ha="right",
             fontsize=8.5, color=_LINES[case.control]["color"], fontweight="bold", zorder=5,
         )  # fmt: skip
 

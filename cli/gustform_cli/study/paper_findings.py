@@ -8,27 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from gustform.analysis import theorem
 from gustform.control.dual_port import DualPort
 from gustform_cli.run import Ended
 from gustform_cli.run_data import RunData
-from gustform_cli.study.paper_cases import GFM_FR, GFM_MPPT, TURBINE, Built, Case, build
-from gustform_codegen.linear import linearise
+from gustform_cli.study.paper_cases import GFM_FR, GFM_MPPT, SCENARIO, TURBINE, Built, Case
+from gustform_cli.study.stability import SET_B, check_theorem
+from gustform_cli.study.variants import Variants
 from gustform_codegen.modes import Modes, modes
 
-# Inside its dead band a governor does nothing and the frequency is neutral, so eigenvalues are those of the generator
-# without one, with the data that then give the published frequencies. Project notes, set B.
-GOVERNOR_B = (
-    "sg.machine.H=8 s",
-    "sg.governor.T1=0.3 s",
-    "sg.governor.T2=2.5 s",
-    "sg.governor.T3=8.4 s",
-    "sg.governor.droop=0.0613",
-    "sg.governor.half_dead_band=0",
-)
-RANDOM_SETS = 20_000
 _SEED = 1  # of the random sets: the report is the same every time
-_ROUND_OFF = 1e-13  # of the largest eigenvalue: a real part that may as well be zero
 
 
 @dataclass(frozen=True)
@@ -78,10 +66,12 @@ def gains(built: Iterable[Built]) -> dict[str, dict[str, float]]:
     return result
 
 
-def linear_modes(case: Case, fidelity: str, more: Sequence[str] = ()) -> Modes:
-    """The modes of a case in its steady state before the load step, with the governor of set B."""
-    b = build(case, fidelity, [*GOVERNOR_B, *more])
-    return modes(linearise(b.model.built.linked, b.table))
+def linear(case: Case, fidelity: str) -> Variants:
+    """A case to be linearised in its steady state before the load step.
+
+    With governor set B: inside its dead band the other one does nothing, and the frequency is neutral.
+    """
+    return Variants(SCENARIO, [*case.overrides(fidelity), *SET_B])
 
 
 def as_pairs(found: Modes) -> list[list[float]]:
@@ -89,24 +79,24 @@ def as_pairs(found: Modes) -> list[list[float]]:
     return [[float(value.real), float(value.imag)] for value in found.eigenvalues]
 
 
-def stability(case: Case, fidelity: str, T_dc: float) -> Stability:
-    """The rightmost eigenvalue of a case with dual-port control and another filter."""
-    control = build(case, fidelity).turbine.control
+def stability(case: Case, variants: Variants, time_constants: Sequence[float]) -> list[Stability]:
+    """The rightmost eigenvalue of a case with dual-port control, with other filters of the DC voltage, s."""
+    control = variants.component(TURBINE).part("control")
     assert isinstance(control, DualPort)
-    found = linear_modes(case, fidelity, [f"wt.control.T_dc={T_dc} s"])
-    return Stability(case, T_dc, found.rightmost, control.K_d_gsc / control.K_gsc)
+    limit = float(control.K_d_gsc / control.K_gsc)
+    return [
+        Stability(case, T_dc, modes(variants.linear(TURBINE, {"control.T_dc": T_dc})).rightmost, limit)
+        for T_dc in (float(control.T_dc), *time_constants)
+    ]
 
 
 def theorem_check() -> dict[str, float]:
-    """The Lyapunov identity at random states, and exceptions to the theorem, over sets that meet its conditions."""
-    rng = np.random.default_rng(_SEED)
-    sets = theorem.random_sets(RANDOM_SETS, rng)
-    states = rng.standard_normal((RANDOM_SETS, len(theorem.STATES)))
-    values = theorem.eigenvalues(sets)
-    unstable = values.real.max(axis=-1) > _ROUND_OFF * np.abs(values).max(axis=-1)
+    """The Lyapunov identity and the exceptions to the theorem, by the keys of `published`."""
+    checked = check_theorem(_SEED)
     return {
-        "theorem.identity": float(theorem.identity_error(sets, states).max()),
-        "theorem.counter_examples": float(np.count_nonzero(unstable)),
+        "theorem.sets": float(checked["sets"]),
+        "theorem.identity": float(checked["identity_error"]),
+        "theorem.counter_examples": float(checked["counter_examples"]),
     }
 
 

@@ -9,10 +9,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-_ABOVE = (
-    "not reachable: at maximum power grid-forming control still gives inertia, yet the paper has one nadir for both"
-)
-_STEEPER = "not reachable: the Cp data behind it are not published, and the reproduction's surface is steeper here"
+_ABOVE = "at maximum power grid-forming control still gives inertia; the paper has one nadir for both"
+_STEEPER = "not reachable: the paper's Cp data are not published; the surface used here is steeper at 12 m/s"
 _FOLLOWS = "not reachable: follows from K_beta at 12 m/s"
 
 

@@ -1,0 +1,152 @@
+"""report.md of the paper study: every published number beside the reproduced one, and what cannot be met."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from gustform_cli.study import published
+from gustform_cli.study.paper_cases import CASES
+from gustform_cli.study.paper_findings import Stability
+from gustform_cli.study.paper_tables import (
+    Comparison,
+    Frequency,
+    compare,
+    comparison_table,
+    frequency_table,
+    markdown,
+    short_table,
+)
+
+_HEAD = """# The case study of Lyu, Subotić and Groß
+
+{controls} at 8, 10 and 12 m/s: ten 5 MW turbines beside a 210 MVA synchronous generator, 20 MW more
+load at 30 s. Fidelity `{fidelity}`, relative tolerance {rtol:g}. Written by `gustform study paper`; the cases with all
+their channels are in `cases`, the numbers of this page in `summary.json`.
+
+{met} of {all} published numbers are met.{missed}
+"""
+
+_NOT_MET = """These are not, each with the reason:
+
+{rows}
+
+GFM MPPT comes out {above:.1f} mHz above GFL MPPT at 8 m/s ({gfm:.4f} against {gfl:.4f} Hz). Its rotor follows the DC
+voltage, so that some of its kinetic energy reaches the grid; grid-following control keeps the rotor out of it. The
+paper prints 49.397 Hz for both.
+"""
+
+_FREQUENCY_NOTE = """Nadir: the lowest frequency of the synchronous generator after the step. The last three columns are
+60 s after the step. Above rated wind GFM MPPT has a pitch gain too (beta_del is not 0), so that the turbines give more
+than their rated power for half a minute, until the power limiter has taken it back."""
+
+_TABLES_NOTE = "Tables are numbered as in the LaTeX source of the paper. Allowed differences: project notes."
+
+_STABILITY_NOTE = """The rightmost eigenvalue before the load step, {case}, with governor set B, without dead band
+(inside one the frequency is neutral). The published T_dc = {published:g} s with the published K_d and K_theta violates
+T_dc < K_d/K_theta = {limit:.4f} s, which the filter needs and the theorem does not say, because it assumes T_dc = 0.
+The study uses {used:g} s. The eigenvalues of all cases are in `summary.json`; that of the reference angle is 0 and no
+mode. Where a limiter stands at its bend in the steady state (the speed limiter at 1.2 pu), its slope is the mean of
+both sides."""
+
+_DROOP_NOTE = """The smallest droop m_p, %, that the three limits of section V-B allow for a frequency deviation of
+0.005 pu, speed first; `-`: no operating point."""
+
+_PANELS = """(a) DC voltage, (b) power of the wind turbines into the grid, (c) frequency of the synchronous generator,
+(d) frequency of the grid-side converter (for grid-following control that of its PLL), (e) rotor speed, (f) pitch angle.
+What the panels of the paper show is taken from its text."""
+
+
+def report(
+    fidelity: str,
+    rtol: float,
+    frequency: Frequency,
+    numbers: Mapping[str, float],
+    stability: Sequence[Stability],
+    droop_map: Mapping[str, Sequence[object]],
+    figures: Mapping[str, Path],
+) -> str:
+    """The report as Markdown. `figures`: title and file beside it."""
+    rows = compare(numbers)
+    missed = [row for row in rows if not row.met]
+    controls = ", ".join(dict.fromkeys(case.control.label for case in CASES))
+    return "\n".join(
+        [
+            _HEAD.format(
+                controls=controls,
+                fidelity=fidelity,
+                rtol=rtol,
+                met=len(rows) - len(missed),
+                all=len(rows),
+                missed="" if missed else " None is missed.",
+            ),
+            _not_met(missed, numbers),
+            "## Frequency after the load step\n",
+            frequency_table(frequency) + "\n",
+            _FREQUENCY_NOTE + "\n",
+            comparison_table(compare(numbers, published.FREQUENCY)) + "\n",
+            "## The paper's tables\n",
+            _TABLES_NOTE + "\n",
+            "### Table I, wind turbine parameters\n",
+            comparison_table(compare(numbers, published.TURBINE)) + "\n",
+            "### Table II, control parameters that do not depend on the wind\n",
+            comparison_table(compare(numbers, published.CONTROL)) + "\n",
+            "### Table III, control parameters of GFM FR\n",
+            comparison_table(compare(numbers, published.GAINS)) + "\n",
+            "## Stability\n",
+            _stability(stability),
+            comparison_table(compare(numbers, published.THEOREM)) + "\n",
+            "## Smallest achievable droop\n",
+            _DROOP_NOTE + "\n",
+            _droop_table(droop_map) + "\n",
+            "## Figures\n",
+            _PANELS + "\n",
+            *(f"![{title}]({file.name})\n\n*{title}*\n" for title, file in figures.items()),
+        ]
+    )
+
+
+def closing(numbers: Mapping[str, float], paths: Mapping[str, str]) -> str:
+    """The last words on stdout: where things are, the frequencies, and what is not met."""
+    rows = compare(numbers)
+    missed = [row for row in rows if not row.met]
+    lines = [f"{name:12} {path}" for name, path in paths.items()]
+    lines += ["", short_table(CASES, numbers), ""]
+    lines.append(f"{len(rows) - len(missed)} of {len(rows)} published numbers met" + (", all but:" if missed else ""))
+    for row in missed:
+        _, value, reproduced, _, _, _ = row.cells
+        lines.append(f"  {row.published.quantity}: {reproduced} {row.published.unit}, published {value}")
+    return "\n".join(lines)
+
+
+def _not_met(missed: Sequence[Comparison], numbers: Mapping[str, float]) -> str:
+    if not missed:
+        return ""
+    cells = [row.cells for row in missed]
+    head = ["quantity", "published", "reproduced", "difference", "allowed", ""]
+    gfl, gfm = (numbers.get(f"frequency.{key}.8.nadir_hz", float("nan")) for key in ("gfl", "gfm_mppt"))
+    return _NOT_MET.format(rows=markdown(head, cells), above=1e3 * (gfm - gfl), gfm=gfm, gfl=gfl)
+
+
+def _stability(found: Sequence[Stability]) -> str:
+    case = found[0].case
+    rows = [
+        [
+            f"{one.T_dc:g}",
+            f"{one.rightmost.real:+.4g}",
+            f"{abs(one.rightmost.imag):.4g}",
+            "stable" if one.rightmost.real < 0.0 else "**unstable**",
+        ]
+        for one in found
+    ]
+    note = _STABILITY_NOTE.format(
+        case=f"{case.control.label} at {case.wind} m/s",
+        limit=found[0].limit,
+        used=found[0].T_dc,
+        published=found[-1].T_dc,
+    )
+    return f"{note}\n\n{markdown(['T_dc, s', 'real part, 1/s', 'imaginary part, rad/s', ''], rows)}\n"
+
+
+def _droop_table(droop_map: Mapping[str, Sequence[object]]) -> str:
+    return ""
