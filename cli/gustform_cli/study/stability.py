@@ -96,7 +96,7 @@ def stability(out: Path, seed: int = 1) -> Study:
         print(f"[{time.perf_counter() - begin:5.1f} s] {text}", file=sys.stderr, flush=True)
 
     say(f"theorem: {SETS} random parameter sets, seed {seed}")
-    checked = _check_theorem(seed)
+    checked = check_theorem(seed)
     say("full model: linking and steady state")
     full, silent = Variants(SCENARIO, SET_B), Variants(SCENARIO)
     turbine, generator = full.component("wt"), full.component("sg")
@@ -137,7 +137,8 @@ def stability(out: Path, seed: int = 1) -> Study:
 # ---- the theorem ----
 
 
-def _check_theorem(seed: int) -> dict[str, Any]:
+def check_theorem(seed: int) -> dict[str, Any]:
+    """The theorem over random parameter sets that meet its conditions, and over sets that break one."""
     rng = np.random.default_rng(seed)
     sets = theorem.random_sets(SETS, rng)
     real = theorem.eigenvalues(sets).real.max(axis=1)
