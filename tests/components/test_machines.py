@@ -149,7 +149,7 @@ def test_damping_is_power_for_speed_off_nominal(machine: Machine6 | ClassicalMac
      ({"xq": 0.6}, "xq must be at least xq1 = 0.65")],
 )  # fmt: skip
 def test_reactances_must_grow_from_the_leakage_to_the_synchronous_one(given: dict[str, float], wrong: str) -> None:
-    with pytest.raises(GustformError, match=f"GF2041: machine.{wrong}"):
+    with pytest.raises(GustformError, match=f"GF2061: machine.{wrong}"):
         SynchronousGenerator(machine=given).parameter_values()
 
 
@@ -205,7 +205,7 @@ def test_lossless_leaves_out_every_resistance_that_is_given() -> None:
 
 
 def test_exciter_without_effect_is_refused() -> None:
-    with pytest.raises(GustformError, match=r"GF2040: exciter must be ConstantField.*got SEXS.*try machine: Machine6"):
+    with pytest.raises(GustformError, match=r"GF2060: exciter must be ConstantField.*got SEXS.*try machine: Machine6"):
         SynchronousGenerator(machine=ClassicalMachine(), exciter=SEXS())
     SynchronousGenerator(machine=ClassicalMachine(), exciter=ConstantField(V_start=1.02))
 

@@ -92,13 +92,13 @@ class Machine6(SynchronousMachine):
         )
 
     def check_reactances(self) -> None:
-        """GF2041 if they do not grow from the leakage to the synchronous reactance."""
+        """GF2061 if they do not grow from the leakage to the synchronous reactance."""
         for names in (("xl", "xd2", "xd1", "xd"), ("xl", "xq2", "xq1", "xq")):
             for low, high in itertools.pairwise(names):
                 a, b = self.value(low), self.value(high)
                 if b < a or (low == "xl" and b == a):
                     raise GustformError(
-                        "GF2041",
+                        "GF2061",
                         f"{self.path}.{high} must be {'above' if low == 'xl' else 'at least'} {low} = {a:g} "
                         f"({self.declarations()[high].description}, pu); got {b:g}",
                         hint=f"{' < '.join(names[:2])} <= {' <= '.join(names[2:])}",

@@ -125,7 +125,7 @@ class SynchronousGenerator(Component):
         idle = isinstance(machine, SynchronousMachine) and not machine.excited
         if idle and isinstance(exciter, Exciter) and not isinstance(exciter, ConstantField):
             raise GustformError(
-                "GF2040",
+                "GF2060",
                 f"exciter must be ConstantField, because the voltage of a {type(machine).__name__} is constant; "
                 f"got {type(exciter).__name__}",
                 hint="machine: Machine6, or no exciter",

@@ -51,10 +51,10 @@ def test_named_parts_stand_in_every_fidelity(fidelity: str) -> None:
 @pytest.mark.parametrize(
     ("given", "code", "words"),
     [
-        ("machine: ClassicalMachine, exciter: SEXS", "GF2040", "the voltage of a ClassicalMachine is constant"),
+        ("machine: ClassicalMachine, exciter: SEXS", "GF2060", "the voltage of a ClassicalMachine is constant"),
         ("machine: ClassicalMachine, exciter: {K: 100}", "GF1004", "ConstantField has no parameter 'K'"),
         ("machine: TGOV1", "GF1007", "sg.machine must be a SynchronousMachine"),
-        ("machine: {xd1: 2}", "GF2041", "machine.xd must be at least xd1 = 2"),
+        ("machine: {xd1: 2}", "GF2061", "machine.xd must be at least xd1 = 2"),
     ],
 )
 def test_parts_that_do_not_go_together_are_refused_with_their_line(given: str, code: str, words: str) -> None:
