@@ -154,7 +154,8 @@ def warnings(result: Linearised) -> list[str]:
         for one in system.flats
     ]
     if system.held:
-        lines.append(f"held constant, because events or samples set them: discrete values of {', '.join(system.held)}")
+        more = f" and {len(system.held) - 6} more" if len(system.held) > 6 else ""
+        lines.append(f"held, because only events or samples change them: {', '.join(system.held[:6])}{more}")
     if result.modes.ill_conditioned:
         lines.append("eigenvectors nearly coincide: the participation factors of those modes mean little")
     return lines

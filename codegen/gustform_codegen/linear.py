@@ -33,7 +33,7 @@ _STEADY = 1e-6  # largest scaled residual, and share of nominal a second, that s
 _SINGULAR = 1e-14  # reciprocal condition of the equilibrated matrix below which index one is refused
 _AT_BEND = 1e-7  # distance from a bend, as a share of nominal, that counts as standing on it
 _ASIDE = 1e-6  # step to either side of a bend, as a share of nominal
-_REACHES = (0.01, 0.1, 1.0, 10.0)  # how far to look for the other parts of a limiter, of nominal
+_REACHES = (0.01, 0.03, 0.1, 0.3, 1.0, 10.0) * 3  # how far to look for the other parts of a limiter, of nominal
 _JUMP = 1e-4  # change between both sides, as a share of the largest term of the equation, that is no curvature
 
 Ints = NDArray[np.int64]
@@ -78,7 +78,7 @@ class LinearSystem:
     nominal: Array  # of the states
     bends: list[Limiter]  # exactly at a bend: the derivative to these unknowns is the mean of both sides
     flats: list[Limiter]  # on a flat part: no influence of these unknowns
-    held: list[str]  # instances with sampled or event-driven values, which are held
+    held: list[str]  # values that events or samples set; they stay as they are
 
 
 class _Derivatives(TypeEvaluator):
@@ -196,10 +196,19 @@ class Lineariser:
     """Linearises one linked system in any of its steady states; for many of them in a row.
 
     `inputs` are driven inputs and parameters by name ("wt.wind", "load.active"); without them all driven inputs and
-    the parameters that events change. `outputs` are channels as `Linked.select` gives them.
+    the parameters that events change. `outputs` are channels as `Linked.select` gives them. `find_flats=False` leaves
+    `flats` empty: finding them takes most of the time.
     """
 
-    def __init__(self, linked: Linked, inputs: Sequence[str] | None = None, outputs: Sequence[Channel] = ()) -> None:
+    def __init__(
+        self,
+        linked: Linked,
+        inputs: Sequence[str] | None = None,
+        outputs: Sequence[Channel] = (),
+        *,
+        find_flats: bool = True,
+    ) -> None:
+        self.find_flats = find_flats
         n = linked.table.n_unknowns
         if n > MOST_UNKNOWNS:
             raise GustformError(
@@ -270,7 +279,8 @@ class Lineariser:
                     some = np.flatnonzero(is_u & (d.row == row))
                     G_u[position] += entry[some] @ du[d.column[some] - 2 * size - externals]
             bends += _limiters(linked, t, d, jumps, unknowns)
-            flats += _limiters(linked, t, d, d.flat(arguments, entries, nominal), unknowns)
+            if self.find_flats:
+                flats += _limiters(linked, t, d, d.flat(arguments, entries, nominal), unknowns)
         for position, channel in enumerate(self.outputs):
             if channel.kind == 0:
                 G[position], G_y[position, channel.a] = table.start[channel.a], 1.0
@@ -297,7 +307,7 @@ class Lineariser:
             nominal=table.nominal[x].copy(),
             bends=bends,
             flats=flats,
-            held=[name for t in linked.types if t.unit.whens for name in t.names],
+            held=[f"{name}.{s.path}" for t in linked.types for name in t.names for s in t.unit.discretes],
         )
 
     def _input_columns(self, number: int, k: int, d: _Derivatives, slots: Ints) -> Array:

@@ -22,7 +22,7 @@ class Variants:
     def __init__(self, scenario: Path, overrides: Sequence[str] = ()) -> None:
         self.linked = link(load(scenario, overrides)).built.linked
         self.table = steady_state(self.linked).table
-        self._lineariser = Lineariser(self.linked, [])
+        self._lineariser = Lineariser(self.linked, [], find_flats=False)
 
     def component(self, name: str, values: Values | None = None) -> Component:
         """The component of that name, with other parameters."""
