@@ -39,5 +39,5 @@ class GridSideCurrent(GridSide):
         self.eq(self.grid.ir, -I_b * (i_d * c - i_q * s))
         self.eq(self.grid.ii, -I_b * (i_d * s + i_q * c))
         square = i_d * i_d + i_q * i_q
-        self.eq(self.P, self.rating * (self.v_d * i_d + self.v_q * i_q + self.r * square))
+        self.eq(self.P, self.rating * (self.v_d * i_d + self.v_q * i_q + self.resistance * square))
         self.eq(self.Q, self.rating * (self.v_q * i_d - self.v_d * i_q + self.x * square))

@@ -7,6 +7,7 @@ from gustform.aero.rotor import Rotor
 from gustform.control.converter_control import ConverterControl
 from gustform.control.curtailment_schedule import CurtailmentSchedule, observer_table, pitch_table, speed_table
 from gustform.control.dual_port import DualPort
+from gustform.control.grid_following import GridFollowing
 from gustform.control.operating_point import (
     DualPortGains,
     Limits,
@@ -160,9 +161,11 @@ class PmsgTurbine(Component):
         DualPort,
         "control of both converters",
         base=ConverterControl,
+        among=(DualPort, GridFollowing),
         lossless=lambda self: self.fidelity == "lossless",
         curtailment=lambda self: self.curtailment,
         K_msc=lambda self: self.K_msc,
+        k_opt=lambda self: self.power_start() / self.omega_del**3,
     )
     schedule = Part(
         FixedPoint,
@@ -170,7 +173,7 @@ class PmsgTurbine(Component):
         base=OperatingSchedule,
         among=(FixedPoint, CurtailmentSchedule),
         omega_point=lambda self: self.omega_del,
-        beta_point=lambda self: self.beta_del,
+        beta_point=lambda self: self.beta_del - self.pitch_of_limiter(),
         wind_point=lambda self: self.wind_speed,
         curtailment=lambda self: self.control.curtailment,
         omega_max=lambda self: self.omega_max,
@@ -188,6 +191,7 @@ class PmsgTurbine(Component):
         K_p=lambda self: self.K_p,
         omega_max=lambda self: self.omega_max,
         beta_min=lambda self: self.beta_min,
+        beta_limiter=lambda self: self.pitch_of_limiter(),
         P_filtered=lambda self: self.power_start(),
     )
 
@@ -206,6 +210,7 @@ class PmsgTurbine(Component):
     P = Variable("W", "active power of all turbines, delivered at the port", start=1e6, nominal=1e6)
     Q = Variable("var", "reactive power of all turbines, delivered at the port", nominal=1e6)
     omega_gsc = Output("pu", "frequency of the GSC voltage, base f0", start=1.0)
+    tripped = Output("1", "1 after the DC voltage has collapsed: the converters are blocked")
 
     def limits(self) -> Limits:
         """What bounds the operation of this turbine."""
@@ -225,6 +230,12 @@ class PmsgTurbine(Component):
         if not isinstance(control, DualPort):
             return DualPortGains(0.0, 0.0, float("inf"))
         return dual_port_gains(self.operating_point(), control.K_gsc, control.frequency_reserve)
+
+    def pitch_of_limiter(self) -> float:
+        """What of beta_del the integral of the speed limiter gives at the start, deg; the schedule gives the rest."""
+        if self.control.scheduled_pitch or not isinstance(self.schedule, FixedPoint):
+            return 0.0
+        return max(self.beta_del - self.beta_min, 0.0)
 
     def equations(self) -> None:
         rotor, drive, pmsg, msc, gsc = self.rotor, self.drive, self.pmsg, self.msc, self.gsc
@@ -251,6 +262,7 @@ class PmsgTurbine(Component):
         self.eq(self.Q_msc, msc.Q / self.rating)
         self.connect(self.v_d, gsc.v_d)
         self.connect(self.v_q, gsc.v_q)
+        self.connect(self.tripped, self.dc_link.tripped)
         # operating point
         self.connect(schedule.wind, self.wind)
         self.connect(schedule.omega_r, self.omega_r)
@@ -270,6 +282,7 @@ class PmsgTurbine(Component):
             "omega_del": schedule.omega_del,
             "beta_del": schedule.beta_del,
             "wind": self.wind,
+            "blocked": self.tripped,
         }
         for name in control.declared(Input):
             self.connect(getattr(control, name), measured[name])

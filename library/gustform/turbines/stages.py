@@ -7,9 +7,11 @@ from typing import Any
 
 from gustform.electrical.grid_side import GridSide
 from gustform.electrical.gsc import GridSideConverter
+from gustform.electrical.gsc_current import GridSideCurrent
 from gustform.electrical.gsc_voltage_dq import GridSideVoltageDq
 from gustform.electrical.machine_side import MachineSide
 from gustform.electrical.msc import MachineSideConverter
+from gustform.electrical.msc_power import MachineSidePower
 from gustform.electrical.msc_voltage_dq import MachineSideVoltageDq
 from gustform.electrical.permanent_magnet import PermanentMagnetMachine
 from gustform.electrical.pmsg import Pmsg
@@ -23,16 +25,22 @@ _GRID_SIDE: Mapping[tuple[str, str], type[GridSide]] = {
     ("V_gsc", "lossless"): GridSideConverter,
     ("V_gsc", "rms"): GridSideConverter,
     ("V_gsc", "dq"): GridSideVoltageDq,
+    ("i_d_gsc", "lossless"): GridSideCurrent,
+    ("i_d_gsc", "rms"): GridSideCurrent,
 }
 _MACHINE_SIDE: Mapping[tuple[str, str], type[MachineSide]] = {
     ("V_msc", "lossless"): MachineSideConverter,
     ("V_msc", "rms"): MachineSideConverter,
     ("V_msc", "dq"): MachineSideVoltageDq,
+    ("P_msc", "lossless"): MachineSidePower,
+    ("P_msc", "rms"): MachineSidePower,
 }
 _MACHINE: Mapping[tuple[str, str], type[PermanentMagnetMachine]] = {
     ("V_msc", "lossless"): Pmsg,
     ("V_msc", "rms"): Pmsg,
     ("V_msc", "dq"): PmsgDq,
+    ("P_msc", "lossless"): PmsgDq,
+    ("P_msc", "rms"): PmsgDq,
 }
 
 GRID_SIDES = tuple(_GRID_SIDE.values())
