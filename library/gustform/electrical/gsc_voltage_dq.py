@@ -25,7 +25,7 @@ class GridSideVoltageDq(GridSideDq):
 
     def equations(self) -> None:
         super().equations()
-        virtual, capacitor, current = self.virtual, self.capacitor, self.current
+        virtual, capacitor = self.virtual, self.capacitor
         self.connect(virtual.V, self.V)
         self.connect(virtual.i_d, self.i_gd)
         self.connect(virtual.i_q, self.i_gq)
@@ -37,5 +37,3 @@ class GridSideVoltageDq(GridSideDq):
         self.connect(capacitor.i_gd, self.i_gd)
         self.connect(capacitor.i_gq, self.i_gq)
         self.follow(capacitor.i_d_ref, capacitor.i_q_ref)
-        self.connect(current.v_d, self.v_d)
-        self.connect(current.v_q, self.v_q)

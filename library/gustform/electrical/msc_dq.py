@@ -18,7 +18,7 @@ class MachineSideDq(MachineSide):
 
     the CurrentLoop with the EMF fed forward and the current out of the converter, -i. Its gains make the closed loop a
     lag of T_i, if r, L, psi are those of the machine: with L/w_b di/dt = -r i + u,  k_p = L/(w_b T_i),  k_i = r/T_i.
-    pu: rating and voltage of the machine, base of the rotor speed.
+    After `blocked` has become 1 the references are 0. pu: rating and voltage of the machine, base of the rotor speed.
     Source: Harnefors, Nee, IEEE Trans. Industry Applications 34(1), 1998 (internal model control); T_i: project notes.
     """
 
@@ -39,6 +39,7 @@ class MachineSideDq(MachineSide):
     )
 
     omega_r = Input("pu", "rotor speed, measured", start=1.2)
+    blocked = Input("1", "1: the converter is blocked")
     i_d = Variable("pu", "current from the machine along the magnet")
     i_q = Variable("pu", "current from the machine along the EMF", start=0.5)
 
@@ -58,5 +59,6 @@ class MachineSideDq(MachineSide):
 
     def follow(self, i_d: Any, i_q: Any) -> None:
         """The references of the current from the machine."""
-        self.eq(self.current.i_d_ref, -i_d)
-        self.eq(self.current.i_q_ref, -i_q)
+        flowing = 1.0 - self.blocked
+        self.eq(self.current.i_d_ref, -flowing * i_d)
+        self.eq(self.current.i_q_ref, -flowing * i_q)

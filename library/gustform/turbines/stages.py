@@ -8,10 +8,12 @@ from typing import Any
 from gustform.electrical.grid_side import GridSide
 from gustform.electrical.gsc import GridSideConverter
 from gustform.electrical.gsc_current import GridSideCurrent
+from gustform.electrical.gsc_current_dq import GridSideCurrentDq
 from gustform.electrical.gsc_voltage_dq import GridSideVoltageDq
 from gustform.electrical.machine_side import MachineSide
 from gustform.electrical.msc import MachineSideConverter
 from gustform.electrical.msc_power import MachineSidePower
+from gustform.electrical.msc_power_dq import MachineSidePowerDq
 from gustform.electrical.msc_voltage_dq import MachineSideVoltageDq
 from gustform.electrical.permanent_magnet import PermanentMagnetMachine
 from gustform.electrical.pmsg import Pmsg
@@ -27,6 +29,7 @@ _GRID_SIDE: Mapping[tuple[str, str], type[GridSide]] = {
     ("V_gsc", "dq"): GridSideVoltageDq,
     ("i_d_gsc", "lossless"): GridSideCurrent,
     ("i_d_gsc", "rms"): GridSideCurrent,
+    ("i_d_gsc", "dq"): GridSideCurrentDq,
 }
 _MACHINE_SIDE: Mapping[tuple[str, str], type[MachineSide]] = {
     ("V_msc", "lossless"): MachineSideConverter,
@@ -34,6 +37,7 @@ _MACHINE_SIDE: Mapping[tuple[str, str], type[MachineSide]] = {
     ("V_msc", "dq"): MachineSideVoltageDq,
     ("P_msc", "lossless"): MachineSidePower,
     ("P_msc", "rms"): MachineSidePower,
+    ("P_msc", "dq"): MachineSidePowerDq,
 }
 _MACHINE: Mapping[tuple[str, str], type[PermanentMagnetMachine]] = {
     ("V_msc", "lossless"): Pmsg,
@@ -41,6 +45,7 @@ _MACHINE: Mapping[tuple[str, str], type[PermanentMagnetMachine]] = {
     ("V_msc", "dq"): PmsgDq,
     ("P_msc", "lossless"): PmsgDq,
     ("P_msc", "rms"): PmsgDq,
+    ("P_msc", "dq"): PmsgDq,
 }
 
 GRID_SIDES = tuple(_GRID_SIDE.values())
