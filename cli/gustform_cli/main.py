@@ -107,6 +107,56 @@ def linearise(
 
 
 @app.command()
+def design(
+    scenario: Annotated[
+        Path | None, typer.Argument(metavar="SCENARIO.yaml", help="take rotor, ratings and defaults from a scenario")
+    ] = None,
+    component: Annotated[
+        str | None, typer.Argument(metavar="TURBINE", help="which turbine of the scenario [the only one]")
+    ] = None,
+    wind: Annotated[str | None, typer.Option(metavar="SPEED", help="wind speed [8 m/s, or the scenario's]")] = None,
+    eta: Annotated[str | None, typer.Option(metavar="SHARE", help="share of the power that is delivered [0.9]")] = None,
+    curtailment: Annotated[str | None, typer.Option(metavar="SHARE", help="1 - eta instead")] = None,
+    frequency_reserve: Annotated[
+        str | None, typer.Option(metavar="PU", help="largest frequency deviation [0.01]")
+    ] = None,
+    dc_reserve: Annotated[
+        str | None, typer.Option(metavar="PU", help="largest deviation of the DC voltage [0.02]")
+    ] = None,
+    tangent: Annotated[bool, typer.Option("--tangent", help="K_wr, K_beta as tangents, not as secants")] = False,
+    K_gsc: Annotated[str | None, typer.Option("--K-gsc", metavar="PU", help="droop of the grid side")] = None,
+    K_msc: Annotated[str | None, typer.Option("--K-msc", metavar="PU", help="droop of the machine side")] = None,
+    K_p: Annotated[str | None, typer.Option("--K-p", metavar="DEG", help="pitch for speed, deg/pu")] = None,
+    K_d_gsc: Annotated[
+        str | None, typer.Option("--K-d-gsc", metavar="TIME", help="derivative gain of the grid side [6.7 ms]")
+    ] = None,
+    K_d_msc: Annotated[
+        str | None, typer.Option("--K-d-msc", metavar="TIME", help="that of the machine side [K_d_gsc K_msc/K_gsc]")
+    ] = None,
+    T_dc: Annotated[str | None, typer.Option("--T-dc", metavar="TIME", help="filter of the DC voltage [2 ms]")] = None,
+    table: Annotated[
+        Path | None, typer.Option(metavar="FILE.c", help="also write the turbine's curtailment table as C")
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Gains of dual-port control for a wind speed and a curtailment: operating point, limits, droop."""
+    with guarded():
+        from gustform_cli import design as designer
+
+        turbine = designer.find_turbine(scenario, component)
+        given = {
+            "frequency_reserve": frequency_reserve, "dc_reserve": dc_reserve, "K_gsc": K_gsc, "K_msc": K_msc,
+            "K_p": K_p, "K_d_gsc": K_d_gsc, "K_d_msc": K_d_msc, "T_dc": T_dc,
+        }  # fmt: skip
+        found = designer.design(turbine, wind, eta, curtailment, given, tangent)
+        print(designer.as_json(found) if json else designer.as_text(found, turbine))
+        for warning in found.warnings:
+            print(f"warning: {warning}", file=sys.stderr)
+        if table is not None:
+            print(f"table    {designer.write_table(turbine, table)}", file=sys.stderr)
+
+
+@app.command()
 def info(
     name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="component type; all are listed without")] = None,
 ) -> None:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import os
+import sys
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from gustform_cli.exits import guarded
+from gustform_cli.exits import INTERRUPTED, guarded
 
 study = typer.Typer(
     name="study",
@@ -31,6 +34,54 @@ def stability(
         from gustform_cli.study.stability import stability as run
 
         found = run(out, seed)
+        if json:
+            from json import dumps
+
+            print(dumps(found.summary, indent=2))
+        else:
+            print(as_text(found))
+
+
+class Fidelity(StrEnum):
+    """How finely turbines and generators are modelled."""
+
+    lossless = "lossless"
+    rms = "rms"
+    dq = "dq"
+
+
+@study.command()
+def paper(
+    out: Annotated[Path, typer.Option(metavar="DIR", help="folder of the results")] = Path("results/paper"),
+    fidelity: Annotated[Fidelity, typer.Option(help="how finely everything is modelled")] = Fidelity.rms,
+    jobs: Annotated[int | None, typer.Option(metavar="N", min=1, help="cases at a time [one a core]")] = None,
+    json: Annotated[bool, typer.Option("--json", help="print the summary as JSON on stdout")] = False,
+) -> None:
+    """The paper's case study: nine load steps side by side, its figures, and its tables beside the published ones."""
+    from gustform_cli.interrupt import Interrupt
+
+    with Interrupt() as interrupt, guarded():
+        from gustform_cli.study.paper import paper as run
+
+        cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        found = run(out, fidelity.value, jobs or cores, interrupt)
+        if found.status == "interrupted":
+            print("\n".join(["interrupted; of the cases there are", *found.paths.values()]), file=sys.stderr)
+            raise typer.Exit(INTERRUPTED)
+        print(found.as_json() if json else found.as_text())
+
+
+@study.command(name="droop-map")
+def droop_map(
+    out: Annotated[Path, typer.Option(metavar="DIR", help="folder of the results")] = Path("results/droop-map"),
+    json: Annotated[bool, typer.Option("--json", help="print the summary as JSON on stdout")] = False,
+) -> None:
+    """The smallest droop a turbine can have, over wind speed and curtailment: figure and table."""
+    with guarded():
+        from gustform_cli.study.droop_map import as_text
+        from gustform_cli.study.droop_map import droop_map as run
+
+        found = run(out)
         if json:
             from json import dumps
 

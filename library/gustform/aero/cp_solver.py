@@ -57,6 +57,7 @@ class CpSolver:
         self._rows: dict[int, tuple[Any, Any, Any]] = {}
         self._mpp: dict[float, float] = {}
         self._falling_ratio: dict[tuple[float, float], float | None] = {}
+        self._falling_pitch: dict[tuple[float, float, float], float | None] = {}
 
     def value(self, ratio: float, pitch: float) -> float:
         """Cp, with the arguments held inside their ranges as the rotor does."""
@@ -101,8 +102,11 @@ class CpSolver:
 
     def falling_pitch(self, ratio: float, target: float, low: float) -> float | None:
         """The highest pitch angle at which Cp falls through the target; None if it stays above."""
-        bracket = self._bracket(ratio, target, low)
-        return None if bracket is None else self._root(self._pitch, *bracket, [ratio, target])
+        key = (ratio, target, low)
+        if key not in self._falling_pitch:
+            bracket = self._bracket(ratio, target, low)
+            self._falling_pitch[key] = None if bracket is None else self._root(self._pitch, *bracket, [ratio, target])
+        return self._falling_pitch[key]
 
     def falling_pitches(self, ratios: Array, targets: Array, low: float, near: Array | None = None) -> Array:
         """`falling_pitch` of a row of points, solved as one problem; nan where Cp stays above the target.
