@@ -17,7 +17,7 @@ def summary_json(outcome: Outcome) -> str:
 
 
 def closing_lines(outcome: Outcome) -> str:
-    """Paths, then nadir, settling frequency and real-time factor where there are any."""
+    """Paths, then nadir, settling frequency, real-time factor and trips where there are any."""
     summary = outcome.summary
     lines = [f"result   {outcome.result}", f"summary  {outcome.summary_file}"]
     if outcome.figure is not None:
@@ -29,6 +29,7 @@ def closing_lines(outcome: Outcome) -> str:
     if frequency.get("settle_hz") is not None:
         numbers.append(f"settling {frequency['settle_hz']:.3f} Hz")
     numbers.append(f"{times(summary.real_time_factor)} x real time")
+    numbers += [f"{name} tripped at {time:.2f} s" for name, time in list(summary.trips.items())[:4]]
     if summary.status != "completed":
         numbers.insert(0, f"{summary.status} at {summary.simulated_seconds:.3f} s")
     return "\n".join([*lines, ", ".join(numbers)])

@@ -7,7 +7,7 @@ where the wind is constant. Components that stand there several times are thin l
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -205,8 +205,12 @@ def _draw_panel(
     axis.set_xlim(run.time[0], run.time[-1])
     for event in run.json("events") or ():
         axis.axvline(event["at"], color=GREY, linewidth=0.9, linestyle=(0, (4, 3)), zorder=1)
+    trips = (run.json("statistics") or {}).get("trips") or {}
+    for time in trips.values():
+        axis.axvline(time, color=RED, linewidth=0.9, linestyle=(0, (1, 2)), zorder=1)
     if letter == "a":
         _name_events(axis, run)
+        _name_trips(axis, trips)
     if len(curves) > 1 or any(values.ndim > 1 for _, values in curves):
         axis.legend(loc="best")
 
@@ -245,6 +249,21 @@ def _name_events(axis: Axes, run: RunData) -> None:
             va="top",
             fontsize=8,
             color="#555555",
+        )
+
+
+def _name_trips(axis: Axes, trips: Mapping[str, float]) -> None:
+    """Who trips at the first dotted line, in the first panel."""
+    if trips:
+        name, time = min(trips.items(), key=lambda trip: trip[1])
+        axis.annotate(
+            f"{name} trips" if len(trips) == 1 else f"{name} trips, then {len(trips) - 1} more",
+            (time, 0.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(4, 14),
+            textcoords="offset points",
+            fontsize=8,
+            color=RED,
         )
 
 

@@ -20,6 +20,7 @@ from gustform_cli.model import Model
 from gustform_cli.names import short_aliases
 from gustform_cli.result import Quantity, ResultWriter
 from gustform_cli.summary import Summary, solver_figures
+from gustform_cli.trips import TripWatch
 from gustform_cli.versions import versions
 from gustform_codegen.table import SystemTable
 
@@ -57,6 +58,7 @@ class Run:
         event = min((event.at for event in scenario.events), default=None)
         self.watch = FrequencyWatch(event, self.until) if frequency in names else None
         self.watched = names.index(frequency) if frequency in names else -1
+        self.trips = TripWatch(names)
         self.most_rows = rows
         self.file = file
         self._writer: ResultWriter | None = None
@@ -120,6 +122,7 @@ class Run:
             unknowns=self.table.n_unknowns,
             solver=solver_figures(statistics),
             frequency=self.watch.summary(self.every) if self.watch is not None else None,
+            trips=self.trips.times,
         )
         return Ended(summary, writer.finish(status, summary.as_dict()), error)
 
@@ -151,6 +154,7 @@ class Run:
         def take(times: NDArray[np.float64], rows: NDArray[np.float32]) -> None:
             """A block of rows from the solver's thread."""
             writer.append(times, rows)
+            self.trips.add(times, rows)
             if self.watch is not None:
                 self.watch.add(times, rows[:, self.watched].astype(np.float64))
 

@@ -51,7 +51,8 @@ def solver_figures(statistics: Mapping[str, int | float]) -> dict[str, int]:
 
 @dataclass(frozen=True)
 class Summary:
-    """status: completed, interrupted or failed. Times in s; `frequency` only where there is a grid frequency."""
+    """status: completed, interrupted or failed. Times in s; `frequency` only where there is a grid frequency. `trips`:
+    when which turbine tripped."""
 
     status: str
     message: str | None
@@ -62,6 +63,7 @@ class Summary:
     unknowns: int
     solver: dict[str, int] = field(default_factory=dict)
     frequency: dict[str, float | None] | None = None
+    trips: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def real_time_factor(self) -> float:
@@ -69,7 +71,7 @@ class Summary:
         return self.simulated_seconds / self.wall_seconds if self.wall_seconds > 0.0 else 0.0
 
     def as_dict(self) -> dict[str, Any]:
-        """The keys of summary.json, flat but for `frequency`."""
+        """The keys of summary.json, flat but for `frequency` and `trips`."""
         result: dict[str, Any] = {
             "status": self.status,
             "simulated_seconds": self.simulated_seconds,
@@ -82,6 +84,8 @@ class Summary:
         }
         if self.frequency is not None:
             result["frequency"] = self.frequency
+        if self.trips:
+            result["trips"] = dict(self.trips)
         if self.message is not None:
             result["message"] = self.message
         return result
