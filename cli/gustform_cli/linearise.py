@@ -23,6 +23,7 @@ from gustform_codegen.table import Channel
 
 MATRICES, MODES, FIGURE = "linear.nc", "modes.json", "eigenvalues.png"
 _SHOWN = 3  # states that the table names for each mode
+_ROWS = 40  # modes in the table, the least damped; all are in modes.json
 
 
 @dataclass(frozen=True)
@@ -99,13 +100,15 @@ def as_text(result: Linearised) -> str:
     """The modes as a table, then the paths."""
     found = result.modes
     rows = [("real", "imag", "frequency", "damping", "", "states that participate most"), ("1/s", "rad/s", "Hz", "1")]
-    rows += [_row(mode) for mode in found.listed]
+    rows += [_row(mode) for mode in found.listed[:_ROWS]]
     widths = [max(len(row[k]) for row in rows if k < len(row)) for k in range(5)]
     lines = [result.title, ""]
     for row in rows:
         cells = [cell.rjust(width) for cell, width in zip(row[:4], widths, strict=False)]
         cells += [cell.ljust(width) for cell, width in zip(row[4:5], widths[4:], strict=False)]
         lines.append("  ".join([*cells, *row[5:]]).rstrip())
+    if len(found.listed) > _ROWS:
+        lines.append(f"... and {len(found.listed) - _ROWS} faster ones in {MODES}")
     lines += ["", _verdict(found), ""]
     lines += [f"{name:8}  {path}" for name, path in result.files.items()]
     return "\n".join(lines)
@@ -115,7 +118,7 @@ def _row(mode: Mode) -> tuple[str, ...]:
     value = mode.eigenvalue
     oscillates = value.imag > 0.0
     return (
-        f"{value.real:.5g}",
+        "0" if mode.kind == NEUTRAL and not oscillates else f"{value.real:.5g}",
         f"{value.imag:.5g}" if oscillates else "",
         f"{mode.frequency:.4g}" if oscillates else "",
         f"{mode.damping:.4f}" if oscillates and mode.damping is not None else "",

@@ -117,9 +117,10 @@ def modes(system: LinearSystem) -> Modes:
     limit = _ZERO * max(float(np.abs(values).max(initial=0.0)), 1e-300)
     kinds = []
     for i, value in enumerate(eigenvalues):
-        if abs(value) <= limit or i >= m:
-            turned = _turns_all_angles(right[:, i], system)
-            kinds.append(REFERENCE if turned else CONSTANT if i >= m else NEUTRAL)
+        if i >= m:  # an angle whose rate is always zero is the one all others are measured against
+            kinds.append(REFERENCE if system.states[fixed[i - m]].unit == "rad" else CONSTANT)
+        elif abs(value) <= limit:
+            kinds.append(REFERENCE if _turns_all_angles(right[:, i], system) else NEUTRAL)
         else:
             kinds.append(UNSTABLE if value.real > limit else NEUTRAL if value.real > -limit else STABLE)
     share = np.abs(left.T * right)

@@ -55,6 +55,13 @@ def test_the_reference_angle_is_no_instability(reference: bool) -> None:
     assert found.rightmost.real == pytest.approx(-0.25)
 
 
+def test_the_reference_angle_turns_phasors_too() -> None:
+    """Currents that are states in the frame of the network turn with the angle; it is the reference all the same."""
+    found = modes(of([[0.0, 0.0, 0.0], [4.0, -2.0, 1.0], [-3.0, -1.0, -2.0]], "r11"))
+    assert sorted(found.kinds) == sorted([REFERENCE, STABLE, STABLE])
+    assert found.stable
+
+
 def test_without_damping_the_frequency_is_neutral() -> None:
     found = modes(machines(True, damping=0.0))
     assert sorted(found.kinds) == sorted([REFERENCE, NEUTRAL, NEUTRAL, NEUTRAL])  # +-j sqrt(6) do not fade either
