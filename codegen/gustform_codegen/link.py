@@ -402,7 +402,7 @@ def _series_table(source: Series, unit: str) -> SeriesTable:
         name=source.name,
         unit=unit,
         slots=[],
-        interpolation={"linear": 0, "hold": 1}[source.interpolation],
+        interpolation={"linear": 0, "hold": 1, "pchip": 2}[source.interpolation],
         source=0 if source.value is not None else 1,
         on_end={"error": 0, "hold": 1, "repeat": 2}[source.on_end],
         t0=source.t0,

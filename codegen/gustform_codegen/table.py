@@ -49,7 +49,7 @@ class SeriesTable:
     name: str
     unit: str
     slots: list[int]
-    interpolation: int  # 0 linear, 1 hold
+    interpolation: int  # 0 linear, 1 hold, 2 pchip
     source: int  # 0 inline, 1 reader
     on_end: int  # 0 error, 1 hold, 2 repeat
     t0: float

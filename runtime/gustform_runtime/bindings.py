@@ -28,6 +28,7 @@ class Statistics(ctypes.Structure):
         ("restarts", c_int64),
         ("initial_iterations", c_int64),
         ("rows", c_int64),
+        ("cut_steps", c_int64),
         ("last_step", c_double),
         ("last_order", c_int32),
     )

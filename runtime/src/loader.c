@@ -408,7 +408,7 @@ static bool read_series(loader *load, int32_t number)
         !indices(load, "slots", series->n_slots, 0, model->n_inputs, &series->slots)) {
         return false;
     }
-    if (kind[0] > GUST_SERIES_HOLD || kind[3] > 1) {
+    if (kind[0] > GUST_SERIES_PCHIP || kind[3] > 1) {
         return refuse(load, GUST_BAD_TABLE, "series \"%s\" is of an unknown kind (%d, %d, %d, %d)",
                       series->name, kind[0], kind[1], kind[2], kind[3]);
     }

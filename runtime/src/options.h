@@ -24,7 +24,9 @@
     X(event_iterations, 20.0, 1.0, 10000.0, "rounds in which when-clauses may trigger each other at one time") \
     X(chatter_events, 200.0, 2.0, 1e9, "events in direct succession that count as chattering")                 \
     X(chatter_interval, 1e-7, 0.0, 1.0, "time between events below which they are in direct succession, s")    \
-    X(series_block, 1024.0, 16.0, 1e7, "samples read at once from a series that is not held in the model")
+    X(series_block, 1024.0, 16.0, 1e7, "samples read at once from a series that is not held in the model")     \
+    X(series_tolerance, 1e-3, 0.0, 1e3,                                                                        \
+      "how far samples inside a step may leave the line between its ends, of their size; 0: not looked at")
 
 typedef struct gust_options {
 #define GUST_OPTION_FIELD(name, initial, minimum, maximum, sentence) double name;

@@ -97,8 +97,9 @@ static double sample_time(const gust_series *series, int64_t in_window)
                                  : series->time[in_window];
 }
 
-static bool check_window(gust_series_set *set, const gust_series *series)
+static bool check_window(gust_series_set *set, gust_series *series)
 {
+    series->size = 0.0;
     for (int64_t i = 0; i < series->count; ++i) {
         const long long number = series->first + i;
         const bool finite = isfinite(series->value[i]) && (series->what->uniform || isfinite(series->time[i]));
@@ -115,6 +116,7 @@ static bool check_window(gust_series_set *set, const gust_series *series)
                       series->what->name, number, series->time[i], series->time[i - 1]);
             return fail(set, GUST_BAD_SERIES);
         }
+        series->size = fmax(series->size, fabs(series->value[i]));
     }
     return true;
 }
@@ -183,16 +185,30 @@ static bool load_window(gust_series_set *set, gust_series *series, int64_t first
 
 /* -- look-up -------------------------------------------------------------------------------------------- */
 
+/* Samples before and after that at or before t which a value at t may need; the window is kept so that it
+ * holds them unless they do not exist. */
+static int64_t needed_before(const gust_series *series)
+{
+    return series->what->interpolation == GUST_SERIES_PCHIP ? 1 : 0;
+}
+
+static int64_t needed_after(const gust_series *series)
+{
+    return series->what->interpolation == GUST_SERIES_PCHIP ? 2 : 1;
+}
+
 /* Sample in the window at or before t; moves the window if need be. t before the first or after the last
  * sample gives the first or last. */
 static bool locate_stamped(gust_series_set *set, gust_series *series, double t)
 {
-    while (t < series->time[0] && series->first > 0) {
+    while (series->first > 0 &&
+           (series->count <= needed_before(series) || t < series->time[needed_before(series)])) {
         if (!load_window(set, series, series->first - series->capacity / 2)) {
             return false;
         }
     }
-    while (t > series->time[series->count - 1] && series->first + series->count < series->n_total) {
+    while (series->first + series->count < series->n_total &&
+           (series->count < needed_after(series) || t >= series->time[series->count - needed_after(series)])) {
         const int64_t first = series->first;
         /* A few samples are kept, since the integrator may come back by part of a step. */
         if (!load_window(set, series, first + series->count - series->capacity / 4)) {
@@ -232,10 +248,12 @@ static bool locate_uniform(gust_series_set *set, gust_series *series, double t, 
     /* 2^62 samples will not be reached, but a time of 1e300 s may be asked for. */
     int64_t sample = s < 4.0e18 ? (int64_t)s : INT64_MAX / 2;
     *fraction = s - (double)sample;
-    if (sample < series->first && !load_window(set, series, sample - series->capacity / 4)) {
+    if (series->first > 0 && sample - needed_before(series) < series->first &&
+        !load_window(set, series, sample - series->capacity / 4)) {
         return false;
     }
-    while (sample + 1 >= series->first + series->count && series->first + series->count < series->n_total) {
+    while (sample + needed_after(series) >= series->first + series->count &&
+           series->first + series->count < series->n_total) {
         const int64_t known = series->first + series->count;
         if (!load_window(set, series, sample - series->capacity / 4)) {
             return false;
@@ -255,7 +273,63 @@ static bool locate_uniform(gust_series_set *set, gust_series *series, double t, 
     return true;
 }
 
-static bool linear_value(gust_series_set *set, gust_series *series, double t, double *value)
+/* Time from sample `k` of the window to the next, s. */
+static double spacing(const gust_series *series, int64_t k)
+{
+    return series->what->uniform ? series->what->dt : series->time[k + 1] - series->time[k];
+}
+
+static bool same_sign(double a, double b)
+{
+    return (a > 0.0 && b > 0.0) || (a < 0.0 && b < 0.0);
+}
+
+/* Slope of PCHIP at a sample between an interval of length h0 and slope m0 and one of h1 and m1: their weighted
+ * harmonic mean. */
+static double inner_slope(double h0, double h1, double m0, double m1)
+{
+    const double w0 = 2.0 * h1 + h0;
+    const double w1 = h1 + 2.0 * h0;
+    return same_sign(m0, m1) ? 1.0 / ((w0 / m0 + w1 / m1) / (w0 + w1)) : 0.0;
+}
+
+/* The same at the first or last sample; h0 and m0 are of the outermost interval. */
+static double end_slope(double h0, double h1, double m0, double m1)
+{
+    const double slope = ((2.0 * h0 + h1) * m0 - h0 * m1) / (h0 + h1);
+    if (!same_sign(slope, m0)) {
+        return 0.0;
+    }
+    return !same_sign(m0, m1) && fabs(slope) > 3.0 * fabs(m0) ? 3.0 * m0 : slope;
+}
+
+/* The cubic between samples k and k + 1 of the window. */
+static void fit_cubic(gust_series *series, int64_t k)
+{
+    const double *value = series->value + k;
+    const bool before = k > 0;
+    const bool after = k + 2 < series->count;
+    const double h = spacing(series, k);
+    const double m = (value[1] - value[0]) / h;
+    const double h_before = before ? spacing(series, k - 1) : h;
+    const double m_before = before ? (value[0] - value[-1]) / h_before : m;
+    const double h_after = after ? spacing(series, k + 1) : h;
+    const double m_after = after ? (value[2] - value[1]) / h_after : m;
+    double left = m; /* two samples only: a straight line */
+    double right = m;
+    if (before || after) {
+        left = before ? inner_slope(h_before, h, m_before, m) : end_slope(h, h_after, m, m_after);
+        right = after ? inner_slope(h, h_after, m, m_after) : end_slope(h, h_before, m, m_before);
+    }
+    series->cubic[0] = value[0];
+    series->cubic[1] = left;
+    series->cubic[2] = (3.0 * m - 2.0 * left - right) / h;
+    series->cubic[3] = (left + right - 2.0 * m) / (h * h);
+    series->cubic_of = series->first + k;
+}
+
+/* Value of a linear or PCHIP series. */
+static bool interpolated_value(gust_series_set *set, gust_series *series, double t, double *value)
 {
     const double at = t - series->shift;
     double fraction = 0.0;
@@ -273,7 +347,18 @@ static bool linear_value(gust_series_set *set, gust_series *series, double t, do
         }
     }
     const double *sample = series->value + series->cursor;
-    *value = series->cursor + 1 < series->count ? sample[0] + fraction * (sample[1] - sample[0]) : sample[0];
+    if (series->cursor + 1 >= series->count) {
+        *value = sample[0];
+    } else if (series->what->interpolation == GUST_SERIES_LINEAR) {
+        *value = sample[0] + fraction * (sample[1] - sample[0]);
+    } else {
+        if (series->cubic_of != series->first + series->cursor) {
+            fit_cubic(series, series->cursor);
+        }
+        const double x = fraction * spacing(series, series->cursor);
+        const double *c = series->cubic;
+        *value = c[0] + x * (c[1] + x * (c[2] + x * c[3]));
+    }
     return true;
 }
 
@@ -320,6 +405,7 @@ gust_status gust_series_create(gust_series_set *set, const gust_model *model)
         gust_series *series = &set->series[k];
         series->what = &model->series[k];
         series->n_total = INT64_MAX;
+        series->cubic_of = -1;
         series->step_inverse = series->what->uniform ? 1.0 / series->what->dt : 0.0;
         series->end = series->what->t_end;
         series->next = INFINITY;
@@ -329,6 +415,9 @@ gust_status gust_series_create(gust_series_set *set, const gust_model *model)
             series->count = series->what->n_samples;
             series->n_total = series->count;
             series->end = last_time(series, sample_time(series, series->count - 1));
+            for (int64_t i = 0; i < series->count; ++i) {
+                series->size = fmax(series->size, fabs(series->value[i]));
+            }
         }
     }
     find_end(set);
@@ -445,7 +534,7 @@ static bool evaluate_unopened(gust_series_set *set, double t, double *inputs)
             return fail(set, GUST_BAD_ORDER);
         }
         const bool held = series->what->interpolation == GUST_SERIES_HOLD;
-        if (!(held ? held_value(set, series, t, &value) : linear_value(set, series, t, &value))) {
+        if (!(held ? held_value(set, series, t, &value) : interpolated_value(set, series, t, &value))) {
             return false;
         }
         for (int64_t i = 0; i < series->what->n_slots; ++i) {
@@ -465,16 +554,15 @@ bool gust_series_evaluate(gust_series_set *set, double t, double *inputs)
     }
     for (int32_t k = 0; k < set->n_series; ++k) {
         gust_series *series = &set->series[k];
-        if (series->what->interpolation != GUST_SERIES_LINEAR) {
+        if (series->what->interpolation == GUST_SERIES_HOLD) {
             continue;
         }
-        double value = 0.0;
-        if (!linear_value(set, series, t, &value)) {
+        if (!interpolated_value(set, series, t, &series->latest)) {
             set->evaluated_at = NAN;
             return false;
         }
         for (int64_t i = 0; i < series->what->n_slots; ++i) {
-            inputs[series->what->slots[i]] = value;
+            inputs[series->what->slots[i]] = series->latest;
         }
     }
     set->evaluated_at = t;
@@ -519,4 +607,90 @@ double gust_series_next(const gust_series_set *set)
         next = set->series[k].next < next ? set->series[k].next : next;
     }
     return next;
+}
+
+/* -- looking ahead -------------------------------------------------------------------------------------- */
+
+/* The window holds the samples from that at or before t on; moved forward if it ends before `until` and there
+ * is more to be had. A quarter is kept for the way back. */
+static bool look_ahead_to(gust_series_set *set, gust_series *series, double t, double until)
+{
+    double fraction = 0.0;
+    if (series->what->uniform ? !locate_uniform(set, series, t, &fraction) : !locate_stamped(set, series, t)) {
+        return false;
+    }
+    const bool more = series->first + series->count < series->n_total;
+    if (!more || sample_time(series, series->count - 1) >= until || series->cursor < series->capacity / 2) {
+        return true;
+    }
+    return load_window(set, series, series->first + series->cursor - series->capacity / 4) &&
+           (series->what->uniform ? locate_uniform(set, series, t, &fraction) : locate_stamped(set, series, t));
+}
+
+/* gust_series_limit for one series, in its own time: the "swinging door". The slopes of lines from (t, value)
+ * that pass within `width` of all samples so far are an interval; it can only narrow. */
+static double limit_of(const gust_series *series, double t, double value, double until, double width)
+{
+    double lowest = -INFINITY;
+    double highest = INFINITY;
+    double limit = t;
+    double before = t;
+    double last = value;
+    int64_t k = series->cursor;
+    while (k < series->count && sample_time(series, k) <= gust_moment_end(t)) {
+        ++k;
+    }
+    for (; k < series->count && sample_time(series, k) < until; ++k) {
+        const double time = sample_time(series, k);
+        const double per_time = 1.0 / (time - t);
+        const double rise = series->value[k] - value;
+        if (rise * per_time >= lowest && rise * per_time <= highest) {
+            limit = time;
+        }
+        lowest = fmax(lowest, (rise - width) * per_time);
+        highest = fmin(highest, (rise + width) * per_time);
+        if (lowest > highest) {
+            return limit;
+        }
+        before = time;
+        last = series->value[k];
+    }
+    if (k == series->count && series->first + series->count < series->n_total) {
+        return limit; /* more than the window can hold: as far as it reaches */
+    }
+    /* Between samples as on a straight line, after the last as it is. */
+    const double end = k == series->count ? last
+                                          : last + (series->value[k] - last) * (until - before) /
+                                                       (sample_time(series, k) - before);
+    const double slope = (end - value) / (until - t);
+    return slope >= lowest && slope <= highest ? INFINITY : limit;
+}
+
+/* No sample lies within the step: nothing to look at. The commonest case, so told without finding the place. */
+static bool within_interval(const gust_series *series, double t, double step)
+{
+    const double from = (t - series->what->t0) * series->step_inverse;
+    return series->what->uniform && from + step * series->step_inverse < floor(from) + 1.0;
+}
+
+bool gust_series_limit(gust_series_set *set, double t, double step, double tolerance, double *limit)
+{
+    *limit = INFINITY;
+    for (int32_t k = 0; k < set->n_series; ++k) {
+        gust_series *series = &set->series[k];
+        const double at = t - series->shift;
+        if (series->what->interpolation == GUST_SERIES_HOLD || within_interval(series, at, step)) {
+            continue;
+        }
+        double value = series->latest;
+        if (!look_ahead_to(set, series, at, at + step) ||
+            (t != set->evaluated_at && !interpolated_value(set, series, t, &value))) {
+            return false;
+        }
+        const double own = limit_of(series, at, value, at + step, tolerance * series->size);
+        if (own > at && own + series->shift < *limit) {
+            *limit = own + series->shift;
+        }
+    }
+    return true;
 }

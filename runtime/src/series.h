@@ -1,9 +1,18 @@
 /* Time series that drive inputs.
  *
- * Linear series are evaluated wherever the integrator asks: no stop and no restart at a sample, since a
- * restart would cost more steps than a smooth wind needs in all. Held series are steps: their slots change
- * only in gust_series_update, at times the integrator stops for, so that a step never sees both sides.
- * The same holds for the jump back of a repeated series. */
+ * Linear and PCHIP series are evaluated wherever the integrator asks: no stop and no restart at a sample,
+ * since a restart would cost more steps than a smooth wind needs in all. Held series are steps: their slots
+ * change only in gust_series_update, at times the integrator stops for, so that a step never sees both sides.
+ * The same holds for the jump back of a repeated series.
+ *
+ * The integrator sees a series only where it evaluates it. After a long calm its steps are long, and a short
+ * gust between two evaluations would not exist for it; gust_series_limit looks at the samples a step would
+ * pass over and says how far it may go.
+ *
+ * PCHIP: cubic in each interval, slopes by F. N. Fritsch, J. Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300:
+ * monotone where the samples are, C1. Slopes at the first and last sample: the one-sided three-point formula,
+ * limited so that the shape is kept (C. Moler, Numerical Computing with MATLAB, SIAM 2004, 3.6); the same as
+ * SciPy's PchipInterpolator. */
 #ifndef GUSTFORM_SERIES_H
 #define GUSTFORM_SERIES_H
 
@@ -28,16 +37,20 @@ typedef struct gust_series {
     int64_t cursor;  /* sample in the window that the last look-up used */
     int64_t n_total; /* how many samples there are; INT64_MAX while unknown */
     double step_inverse;
-    double end;   /* last time with data, s */
-    double shift; /* what has been repeated so far, s */
-    double next;  /* next time at which gust_series_update has something to do, s */
+    double latest;    /* value at the time last evaluated, unless held */
+    double size;      /* largest |value| in the window */
+    int64_t cubic_of; /* number of the sample whose interval `cubic` holds for, -1 for none */
+    double cubic[4];  /* value = sum of cubic[i] (t - time of the sample)^i */
+    double end;       /* last time with data, s */
+    double shift;     /* what has been repeated so far, s */
+    double next;      /* next time at which gust_series_update has something to do, s */
 } gust_series;
 
 typedef struct gust_series_set {
     gust_series *series;
     int32_t n_series;
     bool opened;
-    double evaluated_at; /* the time for which the linear slots hold */
+    double evaluated_at; /* the time for which the slots that are interpolated hold */
     double end;          /* first time at which a series that may not end ends, s */
     int32_t ending;      /* that series */
     gust_status failure; /* of the last look-up, GUST_OK if none */
@@ -51,7 +64,7 @@ void gust_series_free(gust_series_set *set);
 /* Allocates windows of `block` samples and reads the first; then writes all slots for time t. */
 gust_status gust_series_open(gust_series_set *set, int64_t block, double t, double *inputs);
 
-/* Writes the slots of all linear series for time t. false: see set->failure and set->message. */
+/* Writes the slots of all interpolated series for time t. false: see set->failure and set->message. */
 bool gust_series_evaluate(gust_series_set *set, double t, double *inputs);
 
 /* At a time gust_series_next named: writes held slots as from t on, starts repetitions. *changed is set if
@@ -60,5 +73,10 @@ bool gust_series_update(gust_series_set *set, double t, double *inputs, bool *ch
 
 /* Next time at which gust_series_update must be called, s. */
 double gust_series_next(const gust_series_set *set);
+
+/* Latest time to which a step from t may go, if it is meant to be `step` long: as far as the samples of every
+ * interpolated series stay within `tolerance` (of the series' size) of the straight line between its ends,
+ * and at least to the next sample. *limit is infinite if the step may be taken. false: see set->failure. */
+bool gust_series_limit(gust_series_set *set, double t, double step, double tolerance, double *limit);
 
 #endif

@@ -310,7 +310,8 @@ gust_status gust_sim_statistics(const gust_sim *sim, gust_statistics *statistics
                                     .root_evaluations = sim->system.root_evaluations,
                                     .events = sim->events.n_events,
                                     .initial_iterations = sim->initial.iterations,
-                                    .rows = sim->sink.next_row};
+                                    .rows = sim->sink.next_row,
+                                    .cut_steps = sim->cut_steps};
     gust_solver_statistics(&sim->solver, statistics);
     statistics->factorisations += sim->initial.factors.factorisations;
     statistics->refactorisations += sim->initial.factors.refactorisations;

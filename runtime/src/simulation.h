@@ -36,12 +36,19 @@ struct gust_sim {
     double next_event;   /* known time at which something will happen, s */
     double reached;      /* time that advance() has reached, s; the integrator may be a step ahead */
     _Atomic double time; /* the same, for other threads */
+    int64_t cut_steps;   /* made shorter because a series turns within them */
     atomic_int stop;     /* set by gust_sim_request_stop */
     char message[4096];
 };
 
 /* The next time at which a sample, a scheduled change or a step of a series is due, s. */
 double gust_next_event(const gust_sim *sim);
+
+/* First step of the integrator at t, s: after consistent values were found and conditions settled there. */
+double gust_first_step(gust_sim *sim, double t);
+
+/* Starts the integrator anew where it stands, as if after an event that changed nothing. */
+gust_status gust_begin_anew(gust_sim *sim);
 
 /* The loop of gust_sim_advance, without hand-over of the last block. */
 gust_status gust_integrate(gust_sim *sim, double until);

@@ -294,6 +294,7 @@ gust_status gust_solver_start(gust_solver *solver, double t, double first_step, 
         return refused(solver, message, size);
     }
     solver->t = t;
+    solver->first_step = first_step;
     solver->stop = INFINITY;
     solver->stalled_steps = 0;
     return choose_pivots(solver, t, first_step, message, size);
@@ -330,9 +331,25 @@ gust_status gust_solver_restart(gust_solver *solver, double t, double first_step
         return refused(solver, message, size);
     }
     solver->t = t;
+    solver->first_step = first_step;
     solver->stop = INFINITY;
     solver->stalled_steps = 0;
     return GUST_OK;
+}
+
+double gust_solver_next_step(const gust_solver *solver)
+{
+    long steps = 0;
+    double step = 0.0;
+    const bool known = IDAGetNumSteps(solver->ida, &steps) == IDA_SUCCESS && steps > 0 &&
+                       IDAGetCurrentStep(solver->ida, &step) == IDA_SUCCESS;
+    return known ? step : solver->first_step;
+}
+
+double gust_solver_last_step(const gust_solver *solver)
+{
+    double step = 0.0;
+    return IDAGetLastStep(solver->ida, &step) == IDA_SUCCESS ? step : 0.0;
 }
 
 enum { MAX_STALLED_STEPS = 100 };
@@ -452,6 +469,7 @@ gust_step gust_solver_step(gust_solver *solver, double stop, gust_status *status
     case IDA_SUCCESS:
         return GUST_STEP_TAKEN;
     case IDA_TSTOP_RETURN:
+        solver->stop = INFINITY; /* the integrator has forgotten it too */
         return GUST_STEP_AT_STOP;
     case IDA_ROOT_RETURN:
         IDAGetRootInfo(solver->ida, solver->events->found);

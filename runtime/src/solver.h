@@ -35,6 +35,7 @@ typedef struct gust_solver {
     klu_symbolic *symbolic;
     gust_factors factors;
     double t;          /* of y and yp, s */
+    double first_step; /* after the last (re)start, s */
     double stop;       /* time the integrator may not step over, s */
     int stalled_steps; /* in succession, that did not move the time */
     /* the last point at which the residual was evaluated, for diagnosis */
@@ -66,6 +67,10 @@ gust_status gust_solver_start(gust_solver *solver, double t, double first_step, 
 
 /* New start at t, after y or yp or the equations have changed. */
 gust_status gust_solver_restart(gust_solver *solver, double t, double first_step, char *message, size_t size);
+
+/* How long the next step is meant to be, and the last one was (0 after a start), s. */
+double gust_solver_next_step(const gust_solver *solver);
+double gust_solver_last_step(const gust_solver *solver);
 
 /* One step, not beyond `stop`. On failure status and message say why. */
 gust_step gust_solver_step(gust_solver *solver, double stop, gust_status *status, char *message, size_t size);

@@ -194,7 +194,7 @@ static void wrong_numbers(void **state)
                                   {"channel", 5, 1, "channel1"},
                                   {"channel", 4, 9, "channel1"},
                                   {"series.0.slots", 0, 2, "slots"},
-                                  {"series.0.kind", 0, 2, "kind"},
+                                  {"series.0.kind", 0, 3, "kind"},
                                   {"series.0.kind", 1, 3, "kind"},
                                   {"series.0.time", 1, 3.0, "not after"},
                                   {"series.0.value", 2, HUGE_VAL, "sample 2"},

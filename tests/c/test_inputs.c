@@ -12,7 +12,7 @@
 static const double PRECISE = 1e-8;
 static const double CLOSE = 1e-5;
 
-enum { LINEAR = 0, HOLD = 1 };
+enum { LINEAR = 0, HOLD = 1, PCHIP = 2 };
 enum { INLINE = 0, READER = 1, FROM_FILE = 2 };
 enum { END_ERROR = 0, END_HOLD = 1, END_REPEAT = 2 };
 
@@ -409,12 +409,251 @@ static void pieces(void **state)
     assert_int_equal(statistics[0].steps, statistics[1].steps);
 }
 
+/* -- PCHIP ---------------------------------------------------------------------------------------------- */
+
+/* Samples that turn, run level and rise in every combination; uneven stamps. */
+static double bumpy_value(int64_t k)
+{
+    static const double CYCLE[] = {0.0, 1.0, 1.0, 4.0, 5.0, 2.0, 2.0, 2.0, -3.0, -1.0, -6.0, -6.5, 7.0};
+    return CYCLE[k % 13] + 0.01 * (double)(k % 7);
+}
+
+static double bumpy_time(int64_t k)
+{
+    return 0.1 * (double)k + 0.03 * (double)(k % 3);
+}
+
+static int read_bumpy(void *context, int64_t first, int64_t count, double *time, double *value)
+{
+    const int64_t samples = *(const int64_t *)context;
+    int delivered = 0;
+    for (; delivered < count && first + delivered < samples; ++delivered) {
+        value[delivered] = bumpy_value(first + delivered);
+        if (time != NULL) {
+            time[delivered] = bumpy_time(first + delivered);
+        }
+    }
+    return delivered;
+}
+
+/* The source voltage at any time, from the residual of a circuit at rest: -u / R. */
+static double source_at(gust_sim *sim, double t)
+{
+    const double y[2] = {0.0, 0.0}, yp[2] = {0.0, 0.0};
+    double residual[2];
+    assert_int_equal(gust_sim_residual(sim, t, y, yp, residual), GUST_OK);
+    return -2.0 * residual[1];
+}
+
+/* In blocks the same numbers come out as from all samples at once, bit for bit, forwards, backwards and at
+ * the borders of blocks; n is such that the last block is cut anywhere. */
+static void pchip_blocks(void **state)
+{
+    (void)state;
+    static double time[200];
+    static double value[200];
+    for (int64_t k = 0; k < 200; ++k) {
+        time[k] = bumpy_time(k);
+        value[k] = bumpy_value(k);
+    }
+    for (int uniform = 0; uniform <= 1; ++uniform) {
+        for (int64_t n = 1; n < 200; n += n < 40 ? 1 : 17) {
+            static system_builder builder;
+            gust_model *model[2];
+            gust_sim *sim[2];
+            for (int blocks = 0; blocks <= 1; ++blocks) {
+                rc(&builder);
+                if (blocks == 0) {
+                    builder_inline_series(&builder, PCHIP, END_HOLD, 0, 0.0, 0.1, 1e9,
+                                          uniform == 1 ? NULL : time, value, (size_t)n);
+                } else {
+                    sourced_series(&builder, READER, END_HOLD, uniform == 1, INFINITY, NULL);
+                    writer_i32(&builder.writer, "series.0.kind",
+                               (int32_t[]){PCHIP, READER, END_HOLD, uniform == 1 ? 1 : 0}, 4);
+                }
+                model[blocks] = builder_model(&builder);
+                sim[blocks] = new_sim(model[blocks], 1e-6);
+            }
+            gust_sim_set_option(sim[1], "series_block", 16);
+            gust_sim_set_series_reader(sim[1], 0, read_bumpy, &n);
+            initialise(sim[0], 0.0);
+            initialise(sim[1], 0.0);
+            for (int turn = 0; turn < 2; ++turn) {
+                for (int k = 0; k < 700; ++k) {
+                    const double t = (turn == 0 ? k : 700 - k) * 0.1 * ((double)n + 3.0) / 700.0;
+                    assert_true(source_at(sim[0], t) == source_at(sim[1], t));
+                }
+                for (int64_t k = 0; k < n; ++k) {
+                    const double t = uniform == 1 ? 0.1 * (double)k : time[k];
+                    assert_close(source_at(sim[1], t), value[k], 1e-12, "sample");
+                }
+            }
+            for (int blocks = 0; blocks <= 1; ++blocks) {
+                gust_sim_destroy(&sim[blocks]);
+                gust_model_destroy(&model[blocks]);
+            }
+        }
+    }
+}
+
+/* Between two samples the curve stays between them; where they are level it is level. */
+static void pchip_shape(void **state)
+{
+    (void)state;
+    static system_builder builder;
+    double value[40];
+    for (int k = 0; k < 40; ++k) {
+        value[k] = bumpy_value(k);
+    }
+    rc(&builder);
+    builder_inline_series(&builder, PCHIP, END_ERROR, 0, 0.0, 1.0, 39.0, NULL, value, 40);
+    gust_model *model = builder_model(&builder);
+    gust_sim *sim = new_sim(model, 1e-6);
+    initialise(sim, 0.0);
+    for (int k = 0; k < 39; ++k) {
+        double before = value[k];
+        for (int i = 1; i < 20; ++i) {
+            const double now = source_at(sim, k + 0.05 * i);
+            const double rise = value[k + 1] - value[k];
+            assert_true((now - before) * rise >= -1e-12);
+            assert_true(rise != 0.0 || fabs(now - before) < 1e-12);
+            before = now;
+        }
+    }
+    /* and it is run through without an event */
+    advance(sim, 39.0);
+    gust_statistics statistics;
+    gust_sim_statistics(sim, &statistics);
+    assert_int_equal(statistics.events, 0);
+    assert_int_equal(gust_sim_advance(sim, 40.0, NULL), GUST_END_OF_DATA);
+    gust_sim_destroy(&sim);
+    gust_model_destroy(&model);
+}
+
+/* -- gusts after a calm --------------------------------------------------------------------------------- */
+
+enum { CALM_SAMPLES = 72001 };
+
+/* An hour of constant 10 V at 20 Hz with one gust of 5 V that lasts 2 s, 1 - cos. */
+static double calm_value(int64_t k)
+{
+    const double t = 0.05 * (double)k - 2000.3;
+    return t > 0.0 && t < 2.0 ? 10.0 + 2.5 * (1.0 - cos(3.14159265358979 * t)) : 10.0;
+}
+
+static int read_calm(void *context, int64_t first, int64_t count, double *time, double *value)
+{
+    (void)context;
+    int delivered = 0;
+    for (; delivered < count && first + delivered < CALM_SAMPLES; ++delivered) {
+        value[delivered] = calm_value(first + delivered);
+        if (time != NULL) {
+            time[delivered] = 0.05 * (double)(first + delivered);
+        }
+    }
+    return delivered;
+}
+
+static int highest(void *context, int64_t rows, const double *time, const float *values)
+{
+    double *most = context;
+    for (int64_t r = 0; r < rows; ++r) {
+        *most = time[r] > 100.0 ? fmax(*most, (double)values[r]) : *most;
+    }
+    return 0;
+}
+
+/* Highest voltage of the capacitor in the hour. */
+static double highest_voltage(int32_t interpolation, bool uniform, double tolerance,
+                              gust_statistics *statistics)
+{
+    static system_builder builder;
+    rc(&builder);
+    builder.n_channels = 1;
+    const int32_t kind[] = {interpolation, READER, END_ERROR, uniform ? 1 : 0};
+    sourced_series(&builder, READER, END_ERROR, uniform, INFINITY, NULL);
+    writer_i32(&builder.writer, "series.0.kind", kind, 4);
+    writer_f64(&builder.writer, "series.0.timing", (double[]){0.0, 0.05, 3600.0}, 3);
+    gust_model *model = builder_model(&builder);
+    gust_sim *sim = new_sim(model, 1e-6);
+    double most = 0.0;
+    gust_sim_set_series_reader(sim, 0, read_calm, NULL);
+    gust_sim_set_sink(sim, 0.05, 1024, highest, &most);
+    gust_sim_set_option(sim, "series_tolerance", tolerance);
+    initialise(sim, 0.0);
+    advance(sim, 3600.0);
+    gust_sim_statistics(sim, statistics);
+    gust_sim_destroy(&sim);
+    gust_model_destroy(&model);
+    return most;
+}
+
+static void gust_after_calm(void **state)
+{
+    (void)state;
+    /* v' = (u - v) / T with u straight between samples, sample by sample */
+    double expected = 10.0;
+    double v = 10.0;
+    for (int64_t k = 40000; k < 40060; ++k) {
+        const double slope = (calm_value(k + 1) - calm_value(k)) / 0.05;
+        const double base = calm_value(k) - 0.5 * slope;
+        v = base + 0.05 * slope + (v - base) * exp(-0.05 / 0.5);
+        expected = fmax(expected, v);
+    }
+    assert_true(expected > 13.7);
+    gust_statistics statistics;
+    /* without looking ahead nothing happens in this hour: the reason for looking */
+    assert_true(highest_voltage(LINEAR, true, 0.0, &statistics) < 10.01);
+    for (int uniform = 0; uniform <= 1; ++uniform) {
+        for (int32_t interpolation = LINEAR; interpolation <= PCHIP; interpolation += PCHIP) {
+            /* rows are read from within steps, where the error is some 100 rtol at the kinks of the samples */
+            assert_close(highest_voltage(interpolation, uniform == 1, 1e-3, &statistics), expected, 5e-4,
+                         "voltage in the gust");
+            assert_true(statistics.steps < CALM_SAMPLES / 50);
+            assert_true(statistics.cut_steps > 0 && statistics.restarts <= 3 && statistics.events == 0);
+        }
+    }
+}
+
+/* The smallest gust: one sample. Many tolerances; nothing is missed that is larger. */
+static void gust_of_one_sample(void **state)
+{
+    (void)state;
+    static double value[4001];
+    for (int which = 0; which < 20; ++which) {
+        static system_builder builder;
+        const int at = 3000 + 7 * which;
+        for (int k = 0; k < 4001; ++k) {
+            value[k] = k == at ? 12.0 : 10.0;
+        }
+        rc(&builder);
+        builder_inline_series(&builder, LINEAR, END_ERROR, 0, 0.0, 1.0, 4000.0, NULL, value, 4001);
+        gust_model *model = builder_model(&builder);
+        gust_sim *sim = new_sim(model, 1e-6);
+        initialise(sim, 0.0);
+        advance(sim, at);
+        /* v' = (u - v) / T on a ramp of 2 V/s from rest: 2 (t - T (1 - exp(-t / T))) */
+        assert_close(capacitor(sim), 10.0 + 2.0 * (1.0 - 0.5 * (1.0 - exp(-2.0))), 1e-5, "voltage");
+        gust_sim_destroy(&sim);
+        gust_model_destroy(&model);
+    }
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(linear_uniform), cmocka_unit_test(linear_stamped), cmocka_unit_test(hold),
-        cmocka_unit_test(repeat),         cmocka_unit_test(reader),         cmocka_unit_test(reader_fails),
-        cmocka_unit_test(file),           cmocka_unit_test(file_fails),     cmocka_unit_test(begins_too_late),
-        cmocka_unit_test(pieces)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(linear_uniform),
+                                       cmocka_unit_test(linear_stamped),
+                                       cmocka_unit_test(hold),
+                                       cmocka_unit_test(repeat),
+                                       cmocka_unit_test(reader),
+                                       cmocka_unit_test(reader_fails),
+                                       cmocka_unit_test(file),
+                                       cmocka_unit_test(file_fails),
+                                       cmocka_unit_test(begins_too_late),
+                                       cmocka_unit_test(pieces),
+                                       cmocka_unit_test(pchip_blocks),
+                                       cmocka_unit_test(pchip_shape),
+                                       cmocka_unit_test(gust_after_calm),
+                                       cmocka_unit_test(gust_of_one_sample)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

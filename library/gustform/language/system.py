@@ -29,7 +29,7 @@ class Series:
     """A time series: samples held here, or delivered by a reader that the host sets on the runtime.
 
     `time` None: uniform from `t0` with spacing `dt`. `value` None: a reader delivers the samples.
-    `interpolation` "linear" or "hold"; `on_end` "error", "hold" or "repeat"; `t_end` the last valid time, s.
+    `interpolation` "linear", "pchip" or "hold"; `on_end` "error", "hold" or "repeat"; `t_end` the last valid time, s.
     `operating_value` is what the steady-state start takes (for wind: the mean the operating point is made for).
     """
 
@@ -45,8 +45,8 @@ class Series:
 
     def __post_init__(self) -> None:
         wrong = ""
-        if self.interpolation not in ("linear", "hold"):
-            wrong = f"interpolation must be linear or hold; got {self.interpolation!r}"
+        if self.interpolation not in ("linear", "pchip", "hold"):
+            wrong = f"interpolation must be linear, pchip or hold; got {self.interpolation!r}"
         elif self.on_end not in ("error", "hold", "repeat"):
             wrong = f"on_end must be error, hold or repeat; got {self.on_end!r}"
         elif self.time is None and not (math.isfinite(self.dt) and self.dt > 0 and math.isfinite(self.t0)):

@@ -51,6 +51,7 @@ typedef struct gust_statistics {
     int64_t restarts;           /* of the integrator, after events */
     int64_t initial_iterations; /* Newton iterations for consistent values, at the start and after events */
     int64_t rows;               /* result rows produced */
+    int64_t cut_steps;          /* made shorter because a series turns within them */
     double last_step;           /* s */
     int32_t last_order;
 } gust_statistics;

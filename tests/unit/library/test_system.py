@@ -117,7 +117,7 @@ def test_drivers_are_finite(value: float) -> None:
         ({}, "spacing dt > 0"),
         ({"dt": -0.1}, "spacing dt > 0 from t0; got -0.1"),
         ({"dt": math.nan}, "spacing dt > 0"),
-        ({"dt": 0.1, "interpolation": "cubic"}, "linear or hold; got 'cubic'"),
+        ({"dt": 0.1, "interpolation": "cubic"}, "linear, pchip or hold; got 'cubic'"),
         ({"dt": 0.1, "on_end": "stop"}, "error, hold or repeat; got 'stop'"),
         ({"dt": 0.1, "value": np.zeros(0)}, "one row of numbers; got shape (0,)"),
         ({"dt": 0.1, "value": np.zeros((2, 2))}, "one row of numbers"),
