@@ -155,6 +155,9 @@ SYSTEMS: dict[str, Callable[[], System]] = {
 
 # Units whose structure depends on a choice, as that choice makes them.
 VARIANTS: dict[str, Callable[[], Component]] = {
+    "PmsgTurbine, dq": lambda: PmsgTurbine(fidelity="dq"),
+    "PmsgTurbine, dq with grid-following control": lambda: PmsgTurbine(fidelity="dq", control=GridFollowing()),
+    "PmsgTurbine, lossless": lambda: PmsgTurbine(fidelity="lossless"),
     "SynchronousGenerator, lossless": lambda: SynchronousGenerator(fidelity="lossless"),
     "SynchronousGenerator, lossless with exciter": lambda: SynchronousGenerator(fidelity="lossless", exciter=SEXS()),
     "SynchronousGenerator, classical": lambda: SynchronousGenerator(machine=ClassicalMachine()),

@@ -294,7 +294,7 @@ def test_extreme_parameters_give_an_error_or_finite_equations(name: str) -> None
                 refused += 1
                 continue
             except RuntimeError:
-                if (name, path) in REPORTED:
+                if (name.partition(",")[0], path) in REPORTED:
                     continue
                 raise
             splines = [t.spline() for t in at.tables]
