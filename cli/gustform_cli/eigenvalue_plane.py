@@ -20,6 +20,7 @@ _COLOURS = (BLUE, ORANGE, GREEN, "#CC79A7", "#56B4E9", "#F0E442")
 _SLOW = 8.0  # rad/s: modes nearer to the origin than this are those of the second panel, if there are any
 _RAYS = (0.05, 0.1, 0.2, 0.4)  # damping ratios
 _NAMED = 6  # modes with a label in each panel
+_FADING = 0.8  # damping ratio above which a mode is no oscillation worth a label
 
 
 def draw(modes: Modes, title: str, file: Path) -> Path:
@@ -46,7 +47,7 @@ def draw(modes: Modes, title: str, file: Path) -> Path:
         if any(m.kind == REFERENCE for m in modes.listed):
             handles.append(mpl.lines.Line2D([], [], linestyle="", marker="s", markerfacecolor="none", color=GREY))
             labels.append("reference angle")
-        left.legend(handles, labels, title="most of it in", loc="upper left", fontsize=8, title_fontsize=8)
+        left.legend(handles, labels, title="most of it in", loc="upper right", fontsize=8, title_fontsize=8)
         verdict = "stable" if modes.stable else "NOT STABLE"
         canvas.suptitle(f"{title}: {verdict}", x=0.012, ha="left", fontsize=11.5, fontweight="bold")
         try:
@@ -68,9 +69,7 @@ def _point(axis: Axes, mode: Mode, colours: dict[str, str]) -> None:
         axis.plot([0.0], [0.0], "s", markersize=8, markerfacecolor="none", color=GREY, zorder=4, clip_on=False)
         return
     colour = colours[_component(mode.participation[0][0])]
-    axis.plot(
-        [value.real], [value.imag], "x", markersize=7, markeredgewidth=1.8, color=colour, zorder=5, clip_on=False
-    )
+    axis.plot([value.real], [value.imag], "x", markersize=7, markeredgewidth=1.8, color=colour, zorder=5, clip_on=False)
 
 
 def _right_half(axis: Axes) -> None:
@@ -137,11 +136,12 @@ def _near(axis: Axes, modes: list[Mode], colours: dict[str, str]) -> None:
 
 def _label(axis: Axes, modes: list[Mode], middle: float) -> None:
     """What the least damped oscillations are, on the side with more room."""
-    for mode in sorted((m for m in modes if m.eigenvalue.imag > 0.0), key=lambda m: m.damping or 0.0)[:_NAMED]:
+    swinging = [m for m in modes if m.eigenvalue.imag > 0.0 and (m.damping or 0.0) < _FADING]
+    for mode in sorted(swinging, key=lambda m: m.damping or 0.0)[:_NAMED]:
         value = mode.eigenvalue
         to_the_left = value.real > middle
         axis.annotate(
-            f"{mode.frequency:.2g} Hz, damping {mode.damping:.1%}\n{mode.participation[0][0]}",
+            f"{_hertz(mode.frequency)}, damping {mode.damping:.1%}\n{mode.participation[0][0]}",
             (value.real, value.imag),
             xytext=(-9 if to_the_left else 9, 0),
             textcoords="offset points",
@@ -152,3 +152,7 @@ def _label(axis: Axes, modes: list[Mode], middle: float) -> None:
             bbox={"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none", "alpha": 0.8},
             zorder=3,
         )
+
+
+def _hertz(frequency: float) -> str:
+    return f"{frequency:.2g} Hz" if frequency < 100.0 else f"{frequency:.0f} Hz"
