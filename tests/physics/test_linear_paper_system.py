@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -36,7 +37,7 @@ def linear(linked: Linked, table: SystemTable, *channels: str) -> LinearSystem:
     return Lineariser(linked, None, linked.select(channels)[0] if channels else ()).at(table)
 
 
-def matched(found: NDArray[np.complex128], expected: NDArray[np.complex128]) -> float:
+def matched(found: NDArray[Any], expected: NDArray[Any]) -> float:
     """Largest relative distance between two sets of eigenvalues, taken one by one."""
     assert found.size == expected.size
     left = list(expected)

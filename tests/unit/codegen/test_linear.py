@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -231,7 +232,7 @@ class Limited(Component):
     x = Variable("1", "state")
     y = Variable("1", "another, at rest at zero")
 
-    def leaves(self) -> object:
+    def leaves(self) -> Any:
         return maximum(self.y, self.low)
 
     def equations(self) -> None:
@@ -244,17 +245,17 @@ class Inactive(Limited):
 
     gain = Parameter("1", "gain", default=0.0)
 
-    def leaves(self) -> object:
+    def leaves(self) -> Any:
         return maximum(self.x, -1.0) / 1e9 + self.gain * self.y
 
 
 class WithoutBand(Limited):
-    def leaves(self) -> object:
+    def leaves(self) -> Any:
         return dead_band(self.y, self.low)
 
 
 class Inside(Limited):
-    def leaves(self) -> object:
+    def leaves(self) -> Any:
         return limit(self.y, self.low - 1.0, self.low + 1.0)
 
 
