@@ -15,7 +15,6 @@ from gustform.control.dual_port import DualPort
 from gustform.language.component import suggest
 from gustform.language.errors import GustformError
 from gustform.turbines.pmsg_turbine import PmsgTurbine
-from gustform_cli.model import load
 from gustform_cli.quantity import parse_quantity
 
 # Options with a quantity: unit and sentence, by the name in Specification.
@@ -43,6 +42,8 @@ def find_turbine(scenario: Path | None, name: str | None) -> Turbine:
     """The default turbine, or a component of a scenario: the one named, or the only turbine there is. GF2047."""
     if scenario is None:
         return Turbine("", PmsgTurbine())
+    from gustform_cli.model import load  # half a second, which a design without a scenario does not need
+
     assembled = load(scenario)
     found = {key: unit for key, unit in assembled.system.components.items() if isinstance(unit, PmsgTurbine)}
     names = list(dict.fromkeys(key.partition("[")[0] for key in found))

@@ -17,6 +17,7 @@ from gustform.analysis.droop_map import droop_map as solve
 from gustform.language.errors import GustformError
 from gustform.turbines.pmsg_turbine import PmsgTurbine
 from gustform_cli.figures import DARK, GREY, STYLE
+from gustform_cli.png import save
 from gustform_cli.result import prepare_folder
 
 if TYPE_CHECKING:
@@ -123,26 +124,18 @@ def _not_written(path: Path, error: OSError) -> GustformError:
 def draw(found: DroopMap, file: Path) -> Path:
     """Curves over the wind speed for some eta beside the whole map; GF7001 if the figure cannot be saved."""
     import matplotlib as mpl
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     with mpl.rc_context(STYLE):
-        canvas = Figure(figsize=(11.5, 4.6))
-        FigureCanvasAgg(canvas)
-        left, right = canvas.subplots(1, 2, width_ratios=(1.0, 1.12))
+        figure = Figure(figsize=(11.5, 4.6))
+        left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.12))
         _curves(left, found)
-        _map(canvas, right, found)
-        canvas.suptitle(
+        _map(figure, right, found)
+        figure.suptitle(
             f"Smallest achievable droop of the NREL 5 MW turbine, for {100 * found.frequency_reserve:g} % of frequency",
             x=0.012, ha="left", fontsize=12, fontweight="bold",
         )  # fmt: skip
-        try:
-            canvas.savefig(file, dpi=150)
-        except (OSError, ValueError) as error:
-            raise GustformError(
-                "GF7001", f"the figure {str(file)!r} cannot be written; {error}", hint="--out with another folder"
-            ) from None
-    return file
+        return save(figure, file)
 
 
 def _curves(axis: Axes, found: DroopMap) -> None:
@@ -151,7 +144,7 @@ def _curves(axis: Axes, found: DroopMap) -> None:
     colours = mpl.colormaps["viridis"](np.linspace(0.0, 0.85, len(_CURVES)))
     wind = np.array(found.wind)
     axis.axhline(_GENERATOR, color=GREY, linewidth=0.9, zorder=1)
-    axis.text(wind[0] + 0.15, 0.95 * _GENERATOR, "generator of the case study, 5 %", fontsize=8, color=GREY, va="top")
+    axis.text(wind[0] + 0.15, 0.95 * _GENERATOR, "5 %: generator\nof the case study", fontsize=8, color=GREY, va="top")
     for colour, eta in zip(colours, _CURVES, strict=True):
         m_p = 100.0 * found.m_p[found.eta.index(eta)]
         axis.semilogy(wind, m_p, color=colour, label=f"{100.0 * (1.0 - eta):.0f} %", linewidth=1.8)
@@ -165,17 +158,17 @@ def _curves(axis: Axes, found: DroopMap) -> None:
     axis.legend(title="curtailment", loc="upper right")
 
 
-def _map(canvas: Figure, axis: Axes, found: DroopMap) -> None:
+def _map(figure: Figure, axis: Axes, found: DroopMap) -> None:
     from matplotlib.colors import LogNorm
 
     wind, held_back = np.array(found.wind), 100.0 * (1.0 - np.array(found.eta))
     m_p = np.ma.masked_invalid(100.0 * found.m_p)
     axis.set_facecolor("#f3f3f3")
-    levels = np.geomspace(*_SHOWN, 41)
+    levels = np.geomspace(*_SHOWN, 29)
     filled = axis.contourf(wind, held_back, m_p, levels=levels, norm=LogNorm(*_SHOWN), cmap="viridis_r", extend="both")
     lines = axis.contour(wind, held_back, m_p, levels=_LEVELS, colors="white", linewidths=0.8)
     axis.clabel(lines, fmt=lambda value: f"{value:g} %", fontsize=8)
-    bar = canvas.colorbar(filled, ax=axis, ticks=_LEVELS, label="m_p (%)")
+    bar = figure.colorbar(filled, ax=axis, ticks=_LEVELS, label="m_p (%)")
     bar.ax.minorticks_off()
     _plain_numbers(bar.ax.yaxis)
     axis.grid(visible=False)
