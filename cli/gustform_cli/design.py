@@ -70,7 +70,7 @@ def design(
     wind: str | None,
     eta: str | None,
     curtailment: str | None,
-    given: Mapping[str, str],
+    given: Mapping[str, str | None],
     tangent: bool,
 ) -> GainDesign:
     """The design for options as they were written; what is not given comes from the turbine."""

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from gustform.aero.cp_solver import cp_solver
 from gustform.aero.table_rotor import TableRotor
 from gustform.control.curtailment_schedule import CurtailmentSchedule, default_table, pitch_table, speed_table
 from gustform.control.operating_point import OperatingPoint, operating_point, power_at
@@ -76,6 +77,14 @@ def test_splines_go_through_the_published_points_and_stay_near_between() -> None
         error = np.abs(power - [p.power for p in right])
         assert np.max(error[bend]) < 0.004
         assert np.max(error) < 0.015
+
+
+def test_the_observer_can_tell_winds_apart() -> None:
+    # P_v = Cp(v_tip omega/v, beta) v^3 rises with v at fixed speed where 3 Cp > lambda dCp/dlambda
+    aero = cp_solver(PmsgTurbine().rotor)
+    for ratio in np.linspace(*aero.ratios, 30):
+        for pitch in np.linspace(*aero.pitches, 25):
+            assert 3.0 * aero.value(ratio, pitch) > ratio * aero.slopes(ratio, pitch)[0]
 
 
 def test_turbines_alike_share_one_table() -> None:

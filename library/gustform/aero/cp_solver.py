@@ -74,7 +74,8 @@ class CpSolver:
     def values(self, ratios: Array, pitches: Array) -> Array:
         """Cp at pairs of arguments, held inside their ranges."""
         mapped = self._row(ratios.size)[1]
-        return np.asarray(mapped(np.clip(ratios, *self.ratios)[None, :], np.clip(pitches, *self.pitches)[None, :]))[0]
+        value = mapped(np.clip(ratios, *self.ratios)[None, :], np.clip(pitches, *self.pitches)[None, :])
+        return np.asarray(value).ravel()
 
     def mpp(self, pitch: float) -> float:
         """The tip speed ratio of the highest Cp at a pitch angle."""

@@ -152,7 +152,7 @@ def _solved(
             # speed that is not at its limit would have to go beyond the known Cp
             lost = running & (limits.omega_max * to_ratio > aero.ratios[1])
             known &= ~lost
-            for i in np.flatnonzero(lost):
+            for i in np.flatnonzero(lost).tolist():
                 reasons[i, j] = speed_too_low(aero, winds[i], 1.0 - share, beta_min)
         # pitch: what the speed leaves over
         target = share * available
@@ -164,7 +164,7 @@ def _solved(
         if pitching.size:
             aims = (target / to_power)[pitching]
             angle[pitching] = aero.falling_pitches(ratios[pitching], aims, beta_min, near[pitching])
-        for i in np.flatnonzero(known & np.isnan(angle)):
+        for i in np.flatnonzero(known & np.isnan(angle)).tolist():
             least = to_power[i] * aero.value(float(ratios[i]), aero.pitches[1])
             reasons[i, j] = pitch_too_low(aero, winds[i], 1.0 - share, least, float(target[i]))
             too_little[i] = True
@@ -207,7 +207,7 @@ def _extended(values: Array, feasible: NDArray[np.bool_]) -> Array:
         result[:, j] = np.where(np.isnan(result[:, j]), result[:, j + 1], result[:, j])
     # Less curtailment is possible wherever more is, so only whole rows are empty now.
     rows = np.flatnonzero(feasible.any(axis=1))
-    for i in np.flatnonzero(~feasible.any(axis=1)):
+    for i in np.flatnonzero(~feasible.any(axis=1)).tolist():
         result[i] = result[rows[np.argmin(np.abs(rows - i))]]
     return result
 

@@ -39,7 +39,7 @@ class WindObserver(WindSource):
 
     pu of the turbine's rating and base speed, beta in deg; H at base speed. v below `v_min` counts as `v_min`.
     Source: R. Ortega, F. Mancilla-David, F. Jaramillo, "A globally convergent wind speed estimator for wind turbine
-    systems", Int. J. Adapt. Control Signal Process. 27 (2013) 413-425, eqs. (9)-(10), written with power and pitch.
+    systems", Int. J. Adapt. Control Signal Process. 27 (2013) 413-425, written with power and pitch.
     """
 
     gamma = Parameter("m/s", "gain: wind speed for 1 pu of rotor speed", default=50.0, above=0.0)
