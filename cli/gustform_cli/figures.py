@@ -1,14 +1,11 @@
 """The figure of a run, from its result file alone: six panels after the source paper's case-study figures.
 
-(a) DC voltage, (b) power, (c) frequency, (d) rotor speed, (e) pitch angle, (f) wind, or the power of generator and load
-where the wind is constant. Components that stand there several times are thin lines with their mean on top.
+Which they are is said in `panels.py`. Components that stand there several times are thin lines with their mean on top.
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,8 +14,9 @@ from numpy.typing import NDArray
 
 from gustform.language.errors import GustformError
 from gustform_cli.frequency import SETTLE_AFTER
+from gustform_cli.panels import FREQUENCY, WIND, Filled, Panel, filled_panels, still
 from gustform_cli.progress import times
-from gustform_cli.run_data import Curve, RunData
+from gustform_cli.run_data import RunData
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -52,58 +50,10 @@ STYLE: Any = {
 }
 
 
-@dataclass(frozen=True)
-class _Line:
-    """What to draw: channels whose name ends like this, and how to call them."""
-
-    pattern: str
-    label: str
-    scale: Callable[[Curve], NDArray[np.float64]] = lambda curve: curve.values
-
-
-@dataclass(frozen=True)
-class _Panel:
-    title: str
-    unit: str
-    lines: tuple[_Line, ...]
-    least: float  # smallest height of the value axis: a still quantity is drawn as a line, not as its round-off
-
-
-def _mega(curve: Curve) -> NDArray[np.float64]:
-    return curve.values / 1e6
-
-
-_POWER = _Panel(
-    "Power",
-    "pu",
-    (_Line(r"\.P_wt", "from the wind"), _Line(r"\.P_gsc", "grid-side converter")),
-    0.02,
-)
-_PLANT = _Panel(
-    "Active power in the grid",
-    "MW",
-    (_Line(r"\.P", "{component}", _mega),),
-    1.0,
-)
-_WIND = _Panel("Wind", "m/s", (_Line(r"\.wind", "rotor-effective wind"),), 1.0)
-_FREQUENCY = _Panel("Frequency", "Hz", (_Line(r"\.frequency", "{role} ({component})"),), 0.05)
-_PANELS = (
-    _Panel("DC voltage", "pu", (_Line(r"\.v_dc", "DC voltage"),), 0.01),
-    _POWER,
-    _FREQUENCY,
-    _Panel("Rotor speed", "pu", (_Line(r"\.omega_r", "rotor"),), 0.02),
-    _Panel("Pitch angle", "deg", (_Line(r"\.beta", "blades"),), 1.0),
-)
-
-
-# Panels with their curves: label and values.
-Filled = list[tuple[_Panel, list[tuple[str, NDArray[np.float64]]]]]
-
-
 def draw(result: Path, figure: Path) -> Path:
     """Draw the figure of a result file. GF7002 if it is none or has nothing to draw, GF7001 if it cannot be saved."""
     with RunData(result) as run:
-        panels = _filled(run)
+        panels = filled_panels(run)
         if not panels:
             raise GustformError(
                 "GF7002",
@@ -126,7 +76,7 @@ def _draw_panels(panels: Filled, run: RunData, figure: Path) -> None:
         axes = canvas.subplots(rows, 2, sharex=True, squeeze=False).ravel()
         for letter, axis, (panel, curves) in zip("abcdefgh", axes, panels, strict=False):
             _draw_panel(axis, letter, panel, curves, run)
-            if panel.title == _FREQUENCY.title:
+            if panel.title == FREQUENCY.title:
                 _mark_frequency(axis, run)
         for axis in axes[len(panels) :]:
             axis.set_axis_off()
@@ -159,39 +109,8 @@ def _footing(run: RunData) -> str:
     return "   ".join(parts)
 
 
-def _filled(run: RunData) -> Filled:
-    """The panels that the run has channels for."""
-    filled: Filled = []
-    for panel in (*_PANELS, _PLANT if _still(run, _WIND) else _WIND):
-        curves = _curves(run, panel)
-        if curves:
-            filled.append((panel, curves))
-    return filled
-
-
-def _still(run: RunData, panel: _Panel) -> bool:
-    return all(np.ptp(values) < 1e-6 for _, values in _curves(run, panel))
-
-
-def _curves(run: RunData, panel: _Panel) -> list[tuple[str, NDArray[np.float64]]]:
-    """Labels and values, for each line of the panel and each component that has such a channel."""
-    result = []
-    for line in panel.lines:
-        found = [name for name in run.names() if re.fullmatch(r"[^.]+" + line.pattern, name)]
-        for name in found:
-            component = name.split(".")[0]
-            role = "grid" if name == run.attribute("frequency_channel") else "grid-side converter"
-            label = line.label.format(component=component, role=role)
-            if len(found) > 1 and component not in label:
-                label = f"{label}, {component}"
-            curve = run.curve(name)
-            result.append((label, line.scale(curve)))
-    # The grid's own frequency comes last, so that it lies on top of those that follow it.
-    return sorted(result, key=lambda curve: curve[0].startswith("grid ("))
-
-
 def _draw_panel(
-    axis: Axes, letter: str, panel: _Panel, curves: Sequence[tuple[str, NDArray[np.float64]]], run: RunData
+    axis: Axes, letter: str, panel: Panel, curves: Sequence[tuple[str, NDArray[np.float64]]], run: RunData
 ) -> None:
     axis.set_title(f"({letter})  {panel.title}")
     axis.set_ylabel(panel.unit)
@@ -282,7 +201,7 @@ def _mark_frequency(axis: Axes, run: RunData) -> None:
     axis.set_ylim(low - 0.1 * (high - low), high)  # room for the text below the curve
     _point_out(axis, at, nadir, f"nadir {nadir:.3f} Hz at {at:.1f} s")
     settled = figures.get("settle_hz")
-    if settled is not None and run.attribute("status") == "completed" and _still(run, _WIND):
+    if settled is not None and run.attribute("status") == "completed" and still(run, WIND):
         time = min(begin + SETTLE_AFTER, run.time[-1])
         _point_out(axis, time, settled, f"{settled:.3f} Hz at {time:.0f} s")
 
