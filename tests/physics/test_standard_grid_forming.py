@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import cmath
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -79,7 +80,7 @@ def test_matching_frequency_is_the_dc_voltage_at_every_moment(cache: KernelCache
     np.testing.assert_allclose(run["wt.omega_gsc"] - 1.0, 0.2 * (run["wt.v_dc"] - 1.0), atol=1e-12)
 
 
-def modes(control: GridForming, cache: KernelCache) -> tuple[Array, Array]:
+def modes(control: GridForming, cache: KernelCache) -> tuple[Any, float]:
     """Eigenvalues at a stiff grid with a converter voltage that stands, and the synchronising power dP/dtheta, pu."""
     s = with_turbine(PmsgTurbine(aggregate=10, wind_speed=9.0, curtailment=0.1, control=control))
     linked = build(s, cache).linked
@@ -92,10 +93,10 @@ def modes(control: GridForming, cache: KernelCache) -> tuple[Array, Array]:
     e = cmath.exp(1j * theta)
     # P = Re(e conj((e - 1)/z)) and de/dtheta = j e
     slope = (1j * e * ((e - 1.0) / z).conjugate() + e * (1j * e / z).conjugate()).real
-    return np.linalg.eigvals(linear.A), np.array(slope)
+    return np.linalg.eigvals(linear.A), float(slope)
 
 
-def has(eigenvalues: Array, expected: Array) -> None:
+def has(eigenvalues: Any, expected: Any) -> None:
     for value in np.atleast_1d(expected):
         assert np.min(np.abs(eigenvalues - value)) < 1e-6 * abs(value)
 
@@ -108,7 +109,7 @@ def test_virtual_machine_swings_as_its_equation_says(cache: KernelCache) -> None
     swing = np.array(
         [
             [0.0, w0, 0.0],
-            [-float(K_s) / (2 * H), -(1 / m_p + D) / (2 * H), D / (2 * H)],
+            [-K_s / (2 * H), -(1 / m_p + D) / (2 * H), D / (2 * H)],
             [0.0, 1 / T_f, -1 / T_f],
         ]
     )
@@ -119,7 +120,7 @@ def test_droop_has_the_two_modes_of_its_filter_and_angle(cache: KernelCache) -> 
     m_p, T_p = 0.02, 0.1
     found, K_s = modes(Droop(droop=m_p, T_p=T_p, voltage=VoltageDroop(K_q=0.0)), cache)
     # s^2 + s/T_p + w0 m_p K_s/T_p
-    has(found, np.roots([1.0, 1.0 / T_p, 100.0 * math.pi * m_p * float(K_s) / T_p]))
+    has(found, np.roots([1.0, 1.0 / T_p, 100.0 * math.pi * m_p * K_s / T_p]))
 
 
 def test_machine_side_comes_off_its_limit_with_the_sign_of_the_error(cache: KernelCache) -> None:
