@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -27,6 +28,9 @@ from gustform_codegen.table import SystemTable
 if TYPE_CHECKING:
     from gustform_runtime import Simulation, Status
 
+Times = NDArray[np.float64]
+Rows = NDArray[np.float32]
+
 _BLOCK_BYTES = 1 << 20  # of one block of rows, at most: some 20 rows of a thousand turbines
 _BLOCKS = 20  # of a run, at least: what a killed run may lose
 _BLOCK_ROWS = (1024, 4096)  # fewer cost time, more cost memory
@@ -37,17 +41,30 @@ class Ended:
     """How a run ended."""
 
     summary: Summary
-    result: Path
+    file: Path | None  # None for a run without one
     error: GustformError | None  # why it failed, if it did
+
+    @property
+    def result(self) -> Path:
+        """The result file of a run that writes one."""
+        assert self.file is not None
+        return self.file
 
 
 class Run:
-    """A run into `file`. A context; `execute` may work in any thread while others use `time` and `request_stop`.
+    """A run into `file`, or into none. A context; `execute` may work in any thread while others use `time` and
+    `request_stop`.
 
-    `table` starts in the steady state and has the channels of the model.
+    `table` starts in the steady state and has the channels of the model. `watchers` see every block of rows as well.
     """
 
-    def __init__(self, model: Model, table: SystemTable, file: Path) -> None:
+    def __init__(
+        self,
+        model: Model,
+        table: SystemTable,
+        file: Path | None,
+        watchers: Sequence[Callable[[Times, Rows], None]] = (),
+    ) -> None:
         scenario = model.assembled.scenario
         self.model, self.table = model, table
         self.until, self.every = scenario.run.until, scenario.output.every
@@ -61,6 +78,7 @@ class Run:
         self.trips = TripWatch(names)
         self.most_rows = rows
         self.file = file
+        self._watchers = watchers
         self._writer: ResultWriter | None = None
         self._simulation: Simulation | None = None
         self._stop = False
@@ -92,12 +110,12 @@ class Run:
             self._simulation.request_stop()
 
     def execute(self, build_seconds: float = 0.0) -> Ended:
-        """Run to the end or to what stops it; the result file is closed in every case. Defects are raised."""
+        """Run to the end or to what stops it; the result file, if any, is closed in every case. Defects are raised."""
         from gustform_runtime import RunError, Simulation
 
         error, status = None, "completed"
         statistics: dict[str, int | float] = {}
-        writer = self._writer = self._new_writer()
+        writer = self._writer = self._new_writer() if self.file is not None else None
         begin = time.perf_counter()
         try:
             self._simulation = Simulation(self.table.to_bytes())
@@ -110,7 +128,8 @@ class Run:
         except RunError as failure:
             error, status = run_error(failure), "failed"
         except BaseException:
-            writer.finish("failed", {})
+            if writer is not None:
+                writer.finish("failed", {})
             raise
         summary = Summary(
             status=status,
@@ -124,9 +143,11 @@ class Run:
             frequency=self.watch.summary(self.every) if self.watch is not None else None,
             trips=self.trips.times,
         )
-        return Ended(summary, writer.finish(status, summary.as_dict()), error)
+        file = writer.finish(status, summary.as_dict()) if writer is not None else None
+        return Ended(summary, file, error)
 
     def _new_writer(self) -> ResultWriter:
+        assert self.file is not None
         return ResultWriter(
             self.file.parent,
             [Quantity(channel.name, channel.unit, channel.description) for channel in self.model.channels],
@@ -137,7 +158,7 @@ class Run:
             name=self.file.name,
         )
 
-    def _integrate(self, simulation: Simulation, writer: ResultWriter) -> str:
+    def _integrate(self, simulation: Simulation, writer: ResultWriter | None) -> str:
         """Advance to the end; "completed" or "interrupted"."""
         assembled = self.model.assembled
         run = assembled.scenario.run
@@ -151,9 +172,12 @@ class Run:
             if series.name in assembled.readers:
                 simulation.set_series_reader(number, assembled.readers[series.name])
 
-        def take(times: NDArray[np.float64], rows: NDArray[np.float32]) -> None:
+        def take(times: Times, rows: Rows) -> None:
             """A block of rows from the solver's thread."""
-            writer.append(times, rows)
+            if writer is not None:
+                writer.append(times, rows)
+            for watcher in self._watchers:
+                watcher(times, rows)
             self.trips.add(times, rows)
             if self.watch is not None:
                 self.watch.add(times, rows[:, self.watched].astype(np.float64))
