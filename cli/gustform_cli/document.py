@@ -6,6 +6,7 @@ results as its author wrote it.
 
 from __future__ import annotations
 
+import copy
 import datetime
 import io
 from collections.abc import Iterable, Mapping, Sequence
@@ -28,19 +29,29 @@ _MOST_NODES = 200_000
 
 
 @dataclass(frozen=True)
+class Change:
+    """A new value for one path, as users write paths: wt.curtailment, run.until, events[0].at."""
+
+    path: str
+    value: Any
+    place: Place | None  # where it was written, for errors
+
+
+@dataclass(frozen=True)
 class Document:
     """A mapping read from YAML. `tree` keeps comments and positions, `plain()` is ordinary Python."""
 
     file: str
     tree: CommentedMap
-    overridden: Mapping[NodePath, str] = field(default_factory=dict)  # path -> the --set that gave it
+    overridden: Mapping[NodePath, Place | None] = field(default_factory=dict)  # path -> where its value was written
 
     def place(self, path: Sequence[str | int], *, key: bool = False) -> Place:
         """File, line and column of the value at `path` (of its key if `key`), or of the nearest node that exists."""
         path = tuple(path)
         for length in range(len(path), 0, -1):
-            if path[:length] in self.overridden:
-                return Place(f"--set {self.overridden[path[:length]]}")
+            written = self.overridden.get(path[:length])
+            if written is not None:
+                return written
         node: Any = self.tree
         line, column = 0, 0
         for depth, step in enumerate(path):
@@ -63,6 +74,15 @@ class Document:
         plain = self._plain(self.tree, (), budget)
         assert isinstance(plain, dict)
         return plain
+
+    def changed(self, changes: Iterable[Change]) -> Document:
+        """A copy in which some values are others. Raises GF2105 for a path that leads nowhere."""
+        tree = copy.deepcopy(self.tree)
+        overridden = dict(self.overridden)
+        for change in changes:
+            for path in _apply(tree, change):
+                overridden[path] = change.place
+        return Document(self.file, tree, overridden)
 
     def text(self) -> str:
         """The document as YAML, overrides applied, comments kept."""
@@ -161,11 +181,8 @@ def parse(text: str, file: str, overrides: Sequence[str] = ()) -> Document:
             hint="gustform new FILE, which writes one to start from",
             place=Place(file, 1, 1),
         )
-    overridden: dict[NodePath, str] = {}
-    for override in overrides:
-        for path in _apply(tree, override):
-            overridden[path] = override
-    return Document(file, tree, overridden)
+    document = Document(file, tree)
+    return document.changed(_from_text(override) for override in overrides) if overrides else document
 
 
 def _load(text: str, file: str) -> Any:
@@ -200,20 +217,25 @@ def _yaml_hint(problem: str) -> str:
     return "checking indentation, colons (key: value) and brackets near this place"
 
 
-def _apply(tree: CommentedMap, override: str) -> list[NodePath]:
-    """Set one path of the tree; returns the path, and those of mappings it had to begin.
-
-    A first key that is no top-level key but a component's name is looked up among the components, as in events
-    (`load.active`).
-    """
+def _from_text(override: str) -> Change:
+    """The change that `--set path=value` asks for."""
     place = Place(f"--set {override}")
     name, equals, text = override.partition("=")
     if not equals or not name.strip():
         raise GustformError(
             "GF2105", f"--set must be path=value; got {override!r}", hint="--set run.until=30s", place=place
         )
-    value = _load(text, str(place)) if text.strip() else None
-    keys = name.strip().replace("[", ".").replace("]", "").split(".")
+    return Change(name.strip(), _load(text, str(place)) if text.strip() else None, place)
+
+
+def _apply(tree: CommentedMap, change: Change) -> list[NodePath]:
+    """Set one path of the tree; returns the path, and those of mappings it had to begin.
+
+    A first key that is no top-level key but a component's name is looked up among the components, as in events
+    (`load.active`).
+    """
+    name, value, place = change.path, change.value, change.place
+    keys = name.replace("[", ".").replace("]", "").split(".")
     components = tree.get("components")
     if keys[0] not in tree and isinstance(components, CommentedMap) and keys[0] in components:
         keys.insert(0, "components")
@@ -232,7 +254,7 @@ def _apply(tree: CommentedMap, override: str) -> list[NodePath]:
                 else:
                     raise GustformError(
                         "GF2105",
-                        f"the path {name.strip()!r} must lead to a key; {dotted(path)} has no {step!r}",
+                        f"the path {name!r} must lead to a key; {dotted(path)} has no {step!r}",
                         hint=did_you_mean(step, [str(key) for key in node]),
                         place=place,
                     )
@@ -245,7 +267,7 @@ def _apply(tree: CommentedMap, override: str) -> list[NodePath]:
             if not step.isdigit() or int(step) >= len(node):
                 raise GustformError(
                     "GF2105",
-                    f"the path {name.strip()!r} must lead to a key; {dotted(path)} has {len(node)} items, no {step!r}",
+                    f"the path {name!r} must lead to a key; {dotted(path)} has {len(node)} items, no {step!r}",
                     hint=f"a number from 0 to {len(node) - 1}",
                     place=place,
                 )
@@ -257,7 +279,7 @@ def _apply(tree: CommentedMap, override: str) -> list[NodePath]:
         else:
             raise GustformError(
                 "GF2105",
-                f"the path {name.strip()!r} must lead to a key; {dotted(path)} is a single value",
+                f"the path {name!r} must lead to a key; {dotted(path)} is a single value",
                 hint=f"--set {dotted(path)}=...",
                 place=place,
             )
