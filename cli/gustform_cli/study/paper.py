@@ -17,6 +17,7 @@ from gustform_cli.result import prepare_folder
 from gustform_cli.run import Ended
 from gustform_cli.study import paper_findings as findings
 from gustform_cli.study import published
+from gustform_cli.study.droop_map import draw as draw_droop_map
 from gustform_cli.study.paper_cases import CASES, GFM_FR, WINDS, Case, build, run
 from gustform_cli.study.paper_report import closing, report
 from gustform_codegen.modes import modes
@@ -48,7 +49,6 @@ def paper(out: Path, fidelity: str, jobs: int, interrupt: Interrupt) -> Study:
     cases = out / CASES_FOLDER
     prepare_folder(out)
     prepare_folder(cases)
-    _clear(out, cases)
     begin = time.perf_counter()
 
     def say(text: str) -> None:
@@ -57,6 +57,7 @@ def paper(out: Path, fidelity: str, jobs: int, interrupt: Interrupt) -> Study:
     built = [build(case, fidelity) for case in CASES]
     compiled = sum(b.model.built.compilations for b in built)
     say(f"{len(built)} cases built at fidelity {fidelity}, {compiled} component types compiled now")
+    _clear(out, cases)
     ended = run(built, cases, jobs, interrupt)
     complete = [case for case, end in ended.items() if end.summary.status == "completed"]
     say(f"{len(complete)} of {len(built)} cases run, {jobs} at a time")
@@ -73,10 +74,11 @@ def paper(out: Path, fidelity: str, jobs: int, interrupt: Interrupt) -> Study:
     eigenvalues: dict[str, dict[str, list[list[float]]]] = {}
     for case, one in found.items():
         eigenvalues.setdefault(case.control.key, {})[str(case.wind)] = findings.as_pairs(one)
+    droop = findings.droop(built)
     summary: dict[str, Any] = {
         "frequency": findings.frequency(ended),
         "gains": findings.gains(built),
-        "droop_map": findings.droop_map(),
+        "droop_map": {"eta": droop.eta, "wind": droop.wind, "m_p_percent": droop.percent()},
         "eigenvalues": eigenvalues,
     }
     numbers = {
@@ -94,10 +96,10 @@ def paper(out: Path, fidelity: str, jobs: int, interrupt: Interrupt) -> Study:
         )
         for wind in WINDS
     }
-    figures["Smallest achievable droop"] = draw.droop_figure(summary["droop_map"], out / DROOP_MAP)
+    figures["Smallest achievable droop"] = draw_droop_map(droop, out / DROOP_MAP)
     figures["Eigenvalues before the load step"] = draw.eigenvalue_figure(found, out / EIGENVALUES)
     rtol = built[0].model.assembled.scenario.run.rtol
-    text = report(fidelity, rtol, summary["frequency"], numbers, stability, summary["droop_map"], figures)
+    text = report(fidelity, rtol, summary["frequency"], numbers, stability, droop, figures)
     paths = {
         "report": _write(out / REPORT, text),
         "summary": _write(out / SUMMARY, json.dumps(summary, indent=2) + "\n"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from gustform.analysis.droop_map import DroopMap
 from gustform_cli.study import published
 from gustform_cli.study.paper_cases import CASES
 from gustform_cli.study.paper_findings import Stability
@@ -50,7 +51,8 @@ mode. Where a limiter stands at its bend in the steady state (the speed limiter 
 both sides."""
 
 _DROOP_NOTE = """The smallest droop m_p, %, that the three limits of section V-B allow for a frequency deviation of
-0.005 pu, speed first; `-`: no operating point."""
+{reserve:g} pu, speed first, over eta = 1 - curtailment and wind speed; `-`: no operating point. All of the map is in
+`summary.json`."""
 
 _PANELS = """(a) DC voltage, (b) power of the wind turbines into the grid, (c) frequency of the synchronous generator,
 (d) frequency of the grid-side converter (for grid-following control that of its PLL), (e) rotor speed, (f) pitch angle.
@@ -63,7 +65,7 @@ def report(
     frequency: Frequency,
     numbers: Mapping[str, float],
     stability: Sequence[Stability],
-    droop_map: Mapping[str, Sequence[object]],
+    droop: DroopMap,
     figures: Mapping[str, Path],
 ) -> str:
     """The report as Markdown. `figures`: title and file beside it."""
@@ -97,8 +99,8 @@ def report(
             _stability(stability),
             comparison_table(compare(numbers, published.THEOREM)) + "\n",
             "## Smallest achievable droop\n",
-            _DROOP_NOTE + "\n",
-            _droop_table(droop_map) + "\n",
+            _DROOP_NOTE.format(reserve=droop.frequency_reserve) + "\n",
+            _droop_table(droop) + "\n",
             "## Figures\n",
             _PANELS + "\n",
             *(f"![{title}]({file.name})\n\n*{title}*\n" for title, file in figures.items()),
@@ -148,5 +150,11 @@ def _stability(found: Sequence[Stability]) -> str:
     return f"{note}\n\n{markdown(['T_dc, s', 'real part, 1/s', 'imaginary part, rad/s', ''], rows)}\n"
 
 
-def _droop_table(droop_map: Mapping[str, Sequence[object]]) -> str:
-    return ""
+def _droop_table(droop: DroopMap) -> str:
+    """Every other row and the whole wind speeds of the map; all of it is in summary.json."""
+    columns = [k for k, wind in enumerate(droop.wind) if wind == int(wind)]
+    rows = []
+    for eta, values in list(zip(droop.eta, droop.percent(), strict=True))[::2]:
+        cells = [values[k] for k in columns]
+        rows.append([f"{eta:g}", *("-" if value is None else f"{value:.3g}" for value in cells)])
+    return markdown(["eta", *(f"{droop.wind[k]:g} m/s" for k in columns)], rows)
