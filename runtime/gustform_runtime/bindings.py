@@ -11,7 +11,7 @@ SERIES_READER = ctypes.CFUNCTYPE(c_int, c_void_p, c_int64, c_int64, POINTER(c_do
 ROW_SINK = ctypes.CFUNCTYPE(c_int, c_void_p, c_int64, POINTER(c_double), POINTER(c_float))
 
 
-class Statistics(ctypes.Structure):
+class Counters(ctypes.Structure):
     """gust_statistics of gust_sim.h, field by field."""
 
     _fields_ = (
@@ -46,6 +46,47 @@ class OptionInfo(ctypes.Structure):
     )
 
 
+class StatsChannel(ctypes.Structure):
+    """gust_stats_channel of gust_stats.h, field by field."""
+
+    _fields_ = (
+        ("column", c_int32),
+        ("n_edges", c_int32),
+        ("edges", c_void_p),
+        ("segment", c_int32),
+        ("n_exponents", c_int32),
+        ("exponents", c_void_p),
+        ("n_ranges", c_int32),
+        ("range_width", c_double),
+    )
+
+
+class MomentsResult(ctypes.Structure):
+    """gust_stats_moments_result of gust_stats.h, field by field."""
+
+    _fields_ = (
+        ("count", c_int64),
+        ("not_finite", c_int64),
+        ("mean", c_double),
+        ("deviation", c_double),
+        ("minimum", c_double),
+        ("t_minimum", c_double),
+        ("maximum", c_double),
+        ("t_maximum", c_double),
+    )
+
+
+class CyclesResult(ctypes.Structure):
+    """gust_stats_cycles_result of gust_stats.h, field by field."""
+
+    _fields_ = (
+        ("full", c_int64),
+        ("half", c_int64),
+        ("forced", c_int64),
+        ("largest", c_double),
+    )
+
+
 _HANDLE = c_void_p
 _NUMBERS = c_void_p  # address of a numpy array
 
@@ -75,11 +116,25 @@ _SIGNATURES: dict[str, tuple[type | None, tuple[type, ...]]] = {
     "gust_sim_request_stop": (None, (_HANDLE,)),
     "gust_sim_time": (c_double, (_HANDLE,)),
     "gust_sim_message": (c_char_p, (_HANDLE,)),
-    "gust_sim_statistics": (c_int, (_HANDLE, POINTER(Statistics))),
+    "gust_sim_statistics": (c_int, (_HANDLE, POINTER(Counters))),
     "gust_sim_state": (c_int, (_HANDLE, POINTER(c_double), _NUMBERS, _NUMBERS)),
     "gust_sim_channels": (c_int, (_HANDLE, _NUMBERS)),
     "gust_sim_residual": (c_int, (_HANDLE, c_double, _NUMBERS, _NUMBERS, _NUMBERS)),
+    "gust_sim_set_statistics": (c_int, (_HANDLE, _HANDLE, c_double)),
     "gust_sim_jacobian": (c_int, (_HANDLE, c_double, _NUMBERS, _NUMBERS, c_double, _NUMBERS)),
+    "gust_stats_create": (
+        c_int,
+        (POINTER(StatsChannel), c_int32, c_int32, c_double, POINTER(_HANDLE), c_char_p, c_size_t),
+    ),
+    "gust_stats_destroy": (None, (POINTER(_HANDLE),)),
+    "gust_stats_add": (c_int, (_HANDLE, c_int64, _NUMBERS, _NUMBERS)),
+    "gust_stats_moments": (c_int, (_HANDLE, c_int32, POINTER(MomentsResult))),
+    "gust_stats_histogram": (c_int, (_HANDLE, c_int32, _NUMBERS, POINTER(c_int64), POINTER(c_int64))),
+    "gust_stats_spectrum": (c_int, (_HANDLE, c_int32, _NUMBERS, POINTER(c_int64))),
+    "gust_stats_cycles": (c_int, (_HANDLE, c_int32, _NUMBERS, _NUMBERS, POINTER(CyclesResult))),
+    "gust_stats_size": (c_size_t, (_HANDLE,)),
+    "gust_stats_save": (c_int, (_HANDLE, c_char_p, c_size_t, POINTER(c_size_t))),
+    "gust_stats_restore": (c_int, (_HANDLE, c_char_p, c_size_t)),
 }
 
 

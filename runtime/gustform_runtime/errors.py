@@ -34,6 +34,10 @@ class Status(IntEnum):
     BAD_SERIES = -502
     SERIES_NOT_COVERING = -503
     SINK_FAILED = -601
+    CHECKPOINT_FAILED = -602
+    CHECKPOINT_UNREADABLE = -603
+    BAD_CHECKPOINT = -604
+    FOREIGN_CHECKPOINT = -605
 
 
 class RunError(Exception):

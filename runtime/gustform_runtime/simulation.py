@@ -9,8 +9,9 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from gustform_runtime.bindings import ROW_SINK, SERIES_READER, Statistics, library
+from gustform_runtime.bindings import ROW_SINK, SERIES_READER, Counters, library
 from gustform_runtime.errors import RunError, Status
+from gustform_runtime.statistics import Statistics
 
 Doubles = NDArray[np.float64]
 Reader = Callable[[int, int], tuple[Doubles, Doubles]]
@@ -163,6 +164,12 @@ class Simulation:
         self._check(self._library.gust_sim_set_sink(self._open(), interval, block_rows, callback, None))
         self._callbacks.append(callback)
 
+    def set_statistics(self, statistics: Statistics, start: float) -> None:
+        """Give `statistics` a row of all channels at `start`, s, and every `statistics.interval` seconds from then on.
+        Its columns are the channels of this simulation."""
+        self._check(self._library.gust_sim_set_statistics(self._open(), statistics.handle, start))
+        self._callbacks.append(statistics)  # alive as long as C may write to it
+
     # -- run ----------------------------------------------------------------------------------------------------------
 
     def initialise(self, t0: float = 0.0) -> None:
@@ -202,9 +209,9 @@ class Simulation:
 
     def statistics(self) -> dict[str, int | float]:
         """Counters of the run, see gust_statistics in gust_sim.h."""
-        counters = Statistics()
+        counters = Counters()
         self._check(self._library.gust_sim_statistics(self._open(), ctypes.byref(counters)))
-        return {field[0]: getattr(counters, field[0]) for field in Statistics._fields_}
+        return {field[0]: getattr(counters, field[0]) for field in Counters._fields_}
 
     def state(self) -> tuple[float, Doubles, Doubles]:
         """Time reached (s), the unknowns y there, and their derivatives y'."""

@@ -7,10 +7,9 @@
 #include "text.h"
 #include "vector.h"
 
-/* Result rows that are due up to `t`, all within the last step or at its end. */
-static gust_status write_rows(gust_sim *sim, double t)
+/* Rows that are due up to `t`, all within the last step or at its end. */
+static gust_status write_rows(gust_sim *sim, gust_sink *sink, double t)
 {
-    gust_sink *sink = &sim->sink;
     gust_solver *solver = &sim->solver;
     const double little = gust_moment_end(t) - t;
     while (sink->next_time <= t + little) {
@@ -156,7 +155,10 @@ gust_status gust_integrate(gust_sim *sim, double until)
         /* Data may have ended within the last step, if nobody knew before where they end. */
         const double valid = fmin(solver->t, series->end);
         const double now = fmin(valid, until);
-        gust_status status = write_rows(sim, now);
+        gust_status status = write_rows(sim, &sim->sink, now);
+        if (status == GUST_OK) {
+            status = write_rows(sim, &sim->probe, now);
+        }
         reach(sim, now);
         if (status != GUST_OK) {
             return status;

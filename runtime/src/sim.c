@@ -31,8 +31,9 @@ gust_status gust_sim_create(const gust_model *model, gust_sim **sim)
     if (status == GUST_OK) {
         status = gust_sampler_create(&made->sampler, &made->system);
     }
+    made->probe.next_time = INFINITY;
     if (status == GUST_OK) {
-        status = gust_sink_create(&made->sink, &made->system);
+        status = gust_sink_create(&made->sink, &made->system, NULL);
     }
     if (status != GUST_OK) {
         gust_sim_destroy(&made);
@@ -57,6 +58,7 @@ void gust_sim_destroy(gust_sim **sim)
     gust_sim *old = *sim;
     free_solver(old);
     gust_sink_free(&old->sink);
+    gust_sink_free(&old->probe);
     gust_sampler_free(&old->sampler);
     gust_system_free(&old->system);
     gust_release(old);
@@ -162,6 +164,31 @@ gust_status gust_sim_set_sink(gust_sim *sim, double interval, int32_t block_rows
     return GUST_OK;
 }
 
+gust_status gust_sim_set_statistics(gust_sim *sim, gust_stats *stats, double start)
+{
+    if (sim == NULL) {
+        return GUST_BAD_ARGUMENT;
+    }
+    const gust_status order = only_before(sim, "setting statistics");
+    if (order != GUST_OK) {
+        return order;
+    }
+    if (stats != NULL && (gust_stats_n_columns(stats) != sim->model->n_channels || !isfinite(start))) {
+        gust_text(sim->message, sizeof sim->message,
+                  "the statistics are for rows of %d columns, and the simulation has %d channels (start %g s)",
+                  gust_stats_n_columns(stats), sim->model->n_channels, start);
+        return GUST_BAD_ARGUMENT;
+    }
+    gust_sink_free(&sim->probe);
+    sim->probe.next_time = INFINITY;
+    if (stats == NULL) {
+        return GUST_OK;
+    }
+    const gust_status status = gust_sink_create(&sim->probe, &sim->system, stats);
+    sim->probe.start = start;
+    return status;
+}
+
 /* -- run ------------------------------------------------------------------------------------------------ */
 
 static gust_status prepare(gust_sim *sim, double t0)
@@ -179,6 +206,9 @@ static gust_status prepare(gust_sim *sim, double t0)
     }
     if (status == GUST_OK) {
         status = gust_sink_open(&sim->sink, t0);
+    }
+    if (status == GUST_OK && sim->probe.stats != NULL) {
+        status = gust_sink_open(&sim->probe, fmax(sim->probe.start, t0));
     }
     if (status == GUST_OUT_OF_MEMORY) {
         gust_text(message, size, "out of memory for the simulation");

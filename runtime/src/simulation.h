@@ -31,6 +31,7 @@ struct gust_sim {
     gust_solver solver;
     gust_initial initial;
     gust_sink sink;
+    gust_sink probe;     /* rows for statistics, on a grid of their own */
     bool pending;        /* the integrator stands at an event that has not been handled */
     bool root_found;     /* and it is a zero crossing */
     double next_event;   /* known time at which something will happen, s */

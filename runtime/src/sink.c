@@ -39,24 +39,40 @@ static void make_groups(gust_sink *sink, const gust_system *system, const wanted
     }
 }
 
-gust_status gust_sink_create(gust_sink *sink, const gust_system *system)
+static bool is_wanted(const gust_stats *stats, int32_t channel)
+{
+    for (int32_t k = 0; stats != NULL && k < stats->n_channels; ++k) {
+        if (stats->channels[k].column == channel) {
+            return true;
+        }
+    }
+    return stats == NULL;
+}
+
+gust_status gust_sink_create(gust_sink *sink, const gust_system *system, gust_stats *stats)
 {
     const gust_model *model = system->model;
     const size_t n = (size_t)model->n_channels;
-    *sink = (gust_sink){.model = model, .next_time = INFINITY};
+    *sink = (gust_sink){.model = model, .stats = stats, .next_time = INFINITY};
     wanted *list = gust_allocate(n, sizeof *list);
     sink->groups = gust_allocate(n, sizeof *sink->groups);
     sink->output = gust_allocate(n, sizeof *sink->output);
     sink->channel = gust_allocate(n, sizeof *sink->channel);
+    sink->copied = gust_allocate(n, sizeof *sink->copied);
     sink->row = gust_allocate(n, sizeof *sink->row);
-    if (list == NULL || sink->groups == NULL || sink->output == NULL || sink->channel == NULL ||
-        sink->row == NULL) {
+    if (list == NULL || sink->copied == NULL || sink->groups == NULL || sink->output == NULL ||
+        sink->channel == NULL || sink->row == NULL) {
         gust_release(list);
         return GUST_OUT_OF_MEMORY;
     }
     int32_t count = 0;
     for (int32_t k = 0; k < model->n_channels; ++k) {
-        if (model->channels[k].kind == GUST_CHANNEL_OUTPUT) {
+        if (!is_wanted(stats, k)) {
+            continue;
+        }
+        if (model->channels[k].kind == GUST_CHANNEL_UNKNOWN) {
+            sink->copied[sink->n_copied++] = k;
+        } else {
             list[count++] = (wanted){model->channels[k].a, model->channels[k].b, k};
         }
     }
@@ -72,6 +88,7 @@ void gust_sink_free(gust_sink *sink)
     gust_release(sink->groups);
     gust_release(sink->output);
     gust_release(sink->channel);
+    gust_release(sink->copied);
     gust_release(sink->row);
     gust_release(sink->time);
     gust_release(sink->values);
@@ -81,6 +98,10 @@ void gust_sink_free(gust_sink *sink)
 gust_status gust_sink_open(gust_sink *sink, double start)
 {
     sink->start = start;
+    if (sink->stats != NULL) {
+        sink->interval = gust_stats_interval(sink->stats);
+        sink->next_time = start;
+    }
     if (sink->receive == NULL) {
         return GUST_OK;
     }
@@ -98,10 +119,8 @@ bool gust_sink_evaluate(gust_sink *sink, gust_system *system, double t, const do
         return false;
     }
     const gust_channel *channels = sink->model->channels;
-    for (int32_t k = 0; k < sink->model->n_channels; ++k) {
-        if (channels[k].kind == GUST_CHANNEL_UNKNOWN) {
-            row[k] = y[channels[k].a];
-        }
+    for (int32_t k = 0; k < sink->n_copied; ++k) {
+        row[sink->copied[k]] = y[channels[sink->copied[k]].a];
     }
     for (int32_t g = 0; g < sink->n_groups; ++g) {
         const gust_sink_group *group = &sink->groups[g];
@@ -118,14 +137,18 @@ gust_status gust_sink_add(gust_sink *sink, gust_system *system, const double *y,
     if (!gust_sink_evaluate(sink, system, sink->next_time, y, yp, sink->row)) {
         return system->series.failure;
     }
+    const double time = sink->next_time;
+    ++sink->next_row;
+    sink->next_time = sink->start + (double)sink->next_row * sink->interval;
+    if (sink->stats != NULL) {
+        return gust_stats_add(sink->stats, 1, &time, sink->row);
+    }
     const int32_t n = sink->model->n_channels;
     float *values = sink->values + (int64_t)sink->filled * n;
     for (int32_t k = 0; k < n; ++k) {
         values[k] = (float)sink->row[k];
     }
-    sink->time[sink->filled++] = sink->next_time;
-    ++sink->next_row;
-    sink->next_time = sink->start + (double)sink->next_row * sink->interval;
+    sink->time[sink->filled++] = time;
     return sink->filled == sink->block_rows ? gust_sink_flush(sink) : GUST_OK;
 }
 

@@ -1,9 +1,10 @@
-/* Result rows at a fixed interval, collected into blocks. */
+/* Result rows at a fixed interval: collected into blocks for a receiver, or given to statistics one by one. */
 #ifndef GUSTFORM_SINK_H
 #define GUSTFORM_SINK_H
 
 #include <stdint.h>
 
+#include "stats.h"
 #include "system.h"
 
 /* The recorded outputs of one instance: entries first .. first + count - 1 of the plan. */
@@ -16,8 +17,9 @@ typedef struct gust_sink_group {
 
 typedef struct gust_sink {
     const gust_model *model;
-    gust_row_sink receive; /* NULL: nobody wants rows */
+    gust_row_sink receive; /* NULL, and no statistics: nobody wants rows */
     void *context;
+    gust_stats *stats; /* the caller's */
     double interval;
     int32_t block_rows;
     double start;     /* time of row 0, s */
@@ -27,6 +29,8 @@ typedef struct gust_sink {
     double *time;     /* [block_rows] */
     float *values;    /* [block_rows * n_channels] */
     double *row;      /* [n_channels] */
+    int32_t *copied;  /* channels that are unknowns of the system */
+    int32_t n_copied;
     gust_sink_group *groups;
     int32_t n_groups;
     int32_t *output;  /* plan: output number ... */
@@ -34,14 +38,15 @@ typedef struct gust_sink {
     bool derivatives; /* some output is recorded, so y' is needed */
 } gust_sink;
 
-/* Works out which outputs of which instances are recorded. Free with gust_sink_free. */
-gust_status gust_sink_create(gust_sink *sink, const gust_system *system);
+/* Works out which unknowns and which outputs of which instances are wanted: those of all channels, or of the
+ * channels that `stats` (may be NULL) looks at. Free with gust_sink_free. */
+gust_status gust_sink_create(gust_sink *sink, const gust_system *system, gust_stats *stats);
 void gust_sink_free(gust_sink *sink);
 
-/* Allocates the block; the first row is due at `start`. */
+/* Allocates the block, if there is a receiver; the first row is due at `start`. */
 gust_status gust_sink_open(gust_sink *sink, double start);
 
-/* All channels for (t, y, y') into row[n_channels]. false if a time series failed. */
+/* All channels that are wanted for (t, y, y') into row[n_channels]. false if a time series failed. */
 bool gust_sink_evaluate(gust_sink *sink, gust_system *system, double t, const double *y, const double *yp,
                         double *row);
 

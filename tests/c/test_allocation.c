@@ -95,6 +95,16 @@ static void run(void **state)
     assert_int_equal(gust_sim_set_sink(sim, 0.05, 16, collect, &rows), GUST_OK);
     assert_int_equal(gust_sim_set_option(sim, "series_block", 16), GUST_OK);
     assert_int_equal(gust_sim_set_series_reader(sim, 0, read_ramp, NULL), GUST_OK);
+    const gust_stats_channel kept[] = {{.column = 0,
+                                        .n_edges = 2,
+                                        .edges = (double[]){0.0, 10.0},
+                                        .segment = 64,
+                                        .n_exponents = 1,
+                                        .exponents = (double[]){4.0}},
+                                       {.column = 1}};
+    gust_stats *stats = NULL;
+    assert_int_equal(gust_stats_create(kept, 2, 2, 0.01, &stats, NULL, 0), GUST_OK);
+    assert_int_equal(gust_sim_set_statistics(sim, stats, 0.0), GUST_OK);
     initialise(sim, 0.0);
     const long before = allocations;
     assert_true(before > 0); /* the wrapping works */
@@ -108,8 +118,15 @@ static void run(void **state)
     gust_sim_statistics(sim, &statistics);
     assert_int_equal(allocations, before);
     assert_int_equal(rows.rows, 401);
+    gust_stats_moments_result moments;
+    gust_stats_moments(stats, 0, &moments);
+    gust_stats_spectrum(stats, 0, NULL, NULL);
+    gust_stats_cycles(stats, 0, NULL, NULL, NULL);
+    assert_int_equal(allocations, before);
+    assert_int_equal(moments.count, 2001);
     assert_true(statistics.restarts > 220);
     gust_sim_destroy(&sim);
+    gust_stats_destroy(&stats);
     gust_model_destroy(&model);
 }
 

@@ -19,6 +19,7 @@
 
 #include "gust_export.h"
 #include "gust_model.h"
+#include "gust_stats.h"
 #include "gust_status.h"
 
 #ifdef __cplusplus
@@ -88,6 +89,12 @@ GUST_API gust_status gust_sim_set_series_reader(gust_sim *sim, int32_t series, g
  * of an event holds the values before it. `context` stays the caller's. */
 GUST_API gust_status gust_sim_set_sink(gust_sim *sim, double interval, int32_t block_rows, gust_row_sink sink,
                                        void *context);
+
+/* Before initialise: `stats`, whose columns are the channels of the model, gets a row at `start` (s; at the
+ * start of the simulation if that is later) and each of its intervals from then on. Only what it looks at is
+ * worked out. It stays the caller's and must outlive the simulation; results may be asked for between two
+ * advances. NULL: none. */
+GUST_API gust_status gust_sim_set_statistics(gust_sim *sim, gust_stats *stats, double start);
 
 /* Finds consistent values at t0 (s), starting from the start values of the model. */
 GUST_API gust_status gust_sim_initialise(gust_sim *sim, double t0);

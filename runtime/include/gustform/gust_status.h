@@ -8,7 +8,7 @@
  *  -300 ...  integration
  *  -400 ...  events
  *  -500 ...  time series
- *  -600 ...  results
+ *  -600 ...  results and checkpoints
  */
 #ifndef GUSTFORM_GUST_STATUS_H
 #define GUSTFORM_GUST_STATUS_H
@@ -48,7 +48,11 @@ extern "C" {
     X(SERIES_UNREADABLE, -501, "a time series cannot be read")                                                 \
     X(BAD_SERIES, -502, "a time series contains an unusable sample")                                           \
     X(SERIES_NOT_COVERING, -503, "a time series begins after the start of the simulation")                     \
-    X(SINK_FAILED, -601, "the results could not be written")
+    X(SINK_FAILED, -601, "the results could not be written")                                                   \
+    X(CHECKPOINT_FAILED, -602, "a checkpoint could not be written")                                            \
+    X(CHECKPOINT_UNREADABLE, -603, "a checkpoint cannot be read")                                              \
+    X(BAD_CHECKPOINT, -604, "a checkpoint is damaged or not a checkpoint")                                     \
+    X(FOREIGN_CHECKPOINT, -605, "a checkpoint belongs to another model or other settings")
 
 typedef enum gust_status {
 #define GUST_STATUS_ENUMERATOR(name, number, sentence) GUST_##name = (number),
