@@ -78,10 +78,12 @@ def test_both_sides_share_the_ratio_of_their_gains() -> None:
         (0.9, 0.005, -0.1, 0.0),  # and close to zero with -I/T_release, so that it never gets below
         (1.1, 0.0, 0.2, 0.1),  # above the maximum it acts and integrates
         (1.1, 2.0, 0.2, 2.1),
+        (1.1, 30.0, 0.0, 30.0),  # at the largest demand neither of them goes on
+        (0.9, 30.0, -0.2, 29.9),
     ],
 )
 def test_limiter(x: float, integral: float, rate: float, u: float) -> None:
-    found = evaluate(PiLimiter(x_max=1.0, k_p=1.0, k_i=2.0, T_release=0.05), {"x": x, "integral": integral})
+    found = evaluate(PiLimiter(x_max=1.0, k_p=1.0, k_i=2.0, u_max=30.0, T_release=0.05), {"x": x, "integral": integral})
     assert found["der(integral)"] == pytest.approx(rate, abs=1e-12)
     assert found["u"] == pytest.approx(u, abs=1e-12)
 

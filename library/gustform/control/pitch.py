@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from gustform.control.pi_limiter import PiLimiter
 from gustform.control.pitch_servo import PitchServo
-from gustform.language import Component, Input, Output, Parameter, Part, Variable, maximum
+from gustform.language import Component, Input, Output, Parameter, Part, Variable, limit
 
 
 class PitchControl(Component):
     """Pitch angle from rotor speed and power.
 
-        beta_ref = max(beta_min, beta_del + K_p (omega_r - omega_del) + u_speed + u_power)
+        beta_ref = limit(beta_del + K_p (omega_r - omega_del) + u_speed + u_power, beta_min, beta_max)
         u_speed  = PI limiter of omega_r above omega_max
         u_power  = PI limiter of P/(T_P s + 1) above P_max
 
@@ -21,6 +21,7 @@ class PitchControl(Component):
 
     K_p = Parameter("deg", "pitch for speed, deg/pu", default=0.0, min=0.0)
     beta_min = Parameter("deg", "lowest pitch demand", default=0.0)
+    beta_max = Parameter("deg", "highest pitch demand: feathered", default=90.0, above=0.0)
     omega_max = Parameter("pu", "speed above which the speed limiter acts", default=1.2, above=0.0)
     P_max = Parameter("pu", "power above which the power limiter acts", default=1.0, above=0.0)
     beta_start = Parameter("deg", "first guess of the pitch angle", default=0.0)
@@ -34,8 +35,11 @@ class PitchControl(Component):
         k_p=60.0,
         k_i=12.0,
         integral=lambda self: self.beta_limiter,
+        u_max=lambda self: self.beta_max,
     )
-    power_limiter = Part(PiLimiter, "limits the power", x_max=lambda self: self.P_max, k_p=1.0, k_i=2.0)
+    power_limiter = Part(
+        PiLimiter, "limits the power", x_max=lambda self: self.P_max, k_p=1.0, k_i=2.0, u_max=lambda self: self.beta_max
+    )
     servo = Part(PitchServo, "pitch actuator", beta=lambda self: self.beta_start)
 
     beta_del = Input("deg", "pitch angle at the operating point", nominal=10.0)
@@ -52,6 +56,7 @@ class PitchControl(Component):
         self.connect(speed_limiter.x, self.omega_r)
         self.connect(power_limiter.x, self.P_filtered)
         proportional = self.beta_del + self.K_p * (self.omega_r - self.omega_del)
-        self.eq(self.beta_ref, maximum(proportional + speed_limiter.u + power_limiter.u, self.beta_min))
+        demand = proportional + speed_limiter.u + power_limiter.u
+        self.eq(self.beta_ref, limit(demand, self.beta_min, self.beta_max))
         self.connect(servo.beta_ref, self.beta_ref)
         self.connect(self.beta, servo.beta)
