@@ -235,7 +235,7 @@ class PmsgTurbine(Component):
         """What of beta_del the integral of the speed limiter gives at the start, deg; the schedule gives the rest."""
         if self.control.scheduled_pitch or not isinstance(self.schedule, FixedPoint):
             return 0.0
-        return max(self.beta_del - self.beta_min, 0.0)
+        return float(max(self.beta_del - self.beta_min, 0.0))
 
     def equations(self) -> None:
         rotor, drive, pmsg, msc, gsc = self.rotor, self.drive, self.pmsg, self.msc, self.gsc
