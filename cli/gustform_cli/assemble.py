@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -18,9 +19,8 @@ from gustform_cli.components import Reader, entries
 from gustform_cli.document import Document, NodePath, dotted
 from gustform_cli.errors import ErrorList, did_you_mean
 from gustform_cli.scenario import ComponentEntry, Scenario, validate
-from gustform_cli.wind.blocks import ConstantWind, FileWind, TurbulentWindBlock
-from gustform_cli.wind.source import Reader as SeriesReader
-from gustform_cli.wind.source import WindSource, constant, csv_file, turbulence
+from gustform_cli.wind.rotor import Reader as SeriesReader
+from gustform_cli.wind.source import Site, operating_wind, sources
 
 # The signal, the part and the parameter this layer knows by name.
 FRAME = "frame"
@@ -37,6 +37,8 @@ class Assembled:
     system: System
     counts: dict[str, int] = field(default_factory=dict)  # components that stand there several times
     readers: dict[str, SeriesReader] = field(default_factory=dict)  # by the name of the series
+    warnings: list[str] = field(default_factory=list)
+    longest_step: float = math.inf  # of the solver, s, lest it pass over a gust; run.max_step may be shorter
     frequency: str | None = None  # channel of the grid frequency
 
     def instances(self, name: str) -> list[str]:
@@ -74,7 +76,7 @@ def _components(reader: Reader, listed: Mapping[str, Any], scenario: Scenario | 
             if isinstance(node, str) is hanging:
                 implied: dict[str, float | str] = {
                     **_fidelity(entry["type"], scenario),
-                    **_operating_wind(entry["type"], name, scenario),
+                    **_operating_wind(entry, name, reader, scenario),
                     **_voltage(entry["type"], node, made, units),
                 }
                 component = reader.component(name, entry, implied)
@@ -89,13 +91,19 @@ def _fidelity(kind: str, scenario: Scenario | None) -> dict[str, str]:
     return {FIDELITY: scenario.fidelity} if known and scenario is not None else {}
 
 
-def _operating_wind(kind: str, name: str, scenario: Scenario | None) -> dict[str, float]:
-    """The wind speed a turbine's operating point is made for, unless its entry says another: the mean of its wind."""
+def _operating_wind(entry: Mapping[str, Any], name: str, reader: Reader, scenario: Scenario | None) -> dict[str, float]:
+    """The wind speed a turbine's operating point is made for, unless its entry says another: that of its wind."""
     block = scenario.wind.get(name) if scenario is not None else None
-    if kind not in UNITS or UNITS[kind].wind_speed is None or block is None:
+    unit = UNITS.get(entry["type"])
+    if unit is None or unit.wind_speed is None or block is None or scenario is None or unit.wind_speed in entry:
         return {}
-    speed = block.speed if isinstance(block, ConstantWind) else getattr(block, "mean", None)
-    return {} if speed is None else {str(UNITS[kind].wind_speed): speed}
+    try:
+        speed = operating_wind(block, Path(reader.document.file).parent, scenario.run.until)
+    except GustformError as error:
+        place = error.place or reader.document.place(("wind", name))
+        reader.errors.append(GustformError(error.code, error.message, hint=error.hint, place=place))
+        speed = 8.0  # so that nothing else is reported for want of it
+    return {unit.wind_speed: speed}
 
 
 def _voltage(
@@ -307,39 +315,31 @@ class _Assembly:
                 continue
             instances = self.result.instances(name)
             try:
-                for instance, source in zip(instances, self._sources(name, block, instances), strict=True):
+                for instance, source in zip(instances, sources(block, self._site(name, instances)), strict=True):
                     self.result.system.bind(f"{instance}.{wind}", source.drive)
                     if source.reader is not None and isinstance(source.drive, Series):
                         self.result.readers[source.drive.name] = source.reader
+                    self.result.warnings += [text for text in source.warnings if text not in self.result.warnings]
+                    self.result.longest_step = min(self.result.longest_step, source.longest_step)
             except GustformError as error:
                 self._keep(error, path)
 
-    def _sources(
-        self, name: str, block: ConstantWind | TurbulentWindBlock | FileWind, instances: list[str]
-    ) -> list[WindSource]:
-        """A source for each instance: turbulence of its own, or the one wind for all."""
-        if isinstance(block, TurbulentWindBlock):
-            radius = self._radius(block, name)
-            return [turbulence(block, instance, number, radius) for number, instance in enumerate(instances, start=1)]
-        if isinstance(block, ConstantWind):
-            return [constant(block)] * len(instances)
-        operating = self._unit(name).wind_speed
-        if operating is not None and operating not in (self.scenario.components[name].model_extra or {}):
-            raise GustformError(
-                "GF2202",
-                f"components.{name}.{operating} must be given, because the wind comes from a file; it is missing",
-                hint=f"{operating}: 8 m/s, the wind that the operating point is made for",
-                place=self.document.place(("components", name)),
-            )
-        start = float(self.components[name].value(operating)) if operating is not None else None
-        folder = Path(self.document.file).parent
-        return [csv_file(block, name, folder, self.scenario.run.until, start)] * len(instances)
-
-    def _radius(self, block: TurbulentWindBlock, name: str) -> float:
-        """Rotor radius for the averaging, m."""
+    def _site(self, name: str, instances: list[str]) -> Site:
         component = self.components[name]
-        if block.radius is not None or not block.rotor_effective:
-            return block.radius or 0.0
+        operating = self._unit(name).wind_speed
+        return Site(
+            name,
+            instances,
+            folder=Path(self.document.file).parent,
+            until=self.scenario.run.until,
+            operating=float(component.value(operating)) if operating is not None else None,
+            radius=lambda: self._radius(name),
+            place=lambda *keys: self.document.place(("wind", name, *keys)),
+        )
+
+    def _radius(self, name: str) -> float:
+        """Rotor radius, m."""
+        component = self.components[name]
         rotor = component.part(ROTOR) if ROTOR in component.declared(Part) else component
         if RADIUS not in rotor.declared(Parameter):
             raise GustformError(
@@ -349,6 +349,11 @@ class _Assembly:
 
     def _schedule_events(self) -> None:
         for index, event in enumerate(self.scenario.events):
+            if event.at > self.scenario.run.until:
+                self.result.warnings.append(
+                    f"events[{index}] at {event.at:g} s comes after the end of the run, {self.scenario.run.until:g} s: "
+                    "it does not happen"
+                )
             for target, value in event.set.items():
                 path: NodePath = ("events", index, "set", target)
                 name, _, rest = target.partition(".")

@@ -70,11 +70,13 @@ def check(
 ) -> None:
     """Everything up to the linked model, no run: prints the model report."""
     with guarded():
-        from gustform_cli.model import link, load
+        from gustform_cli.model import link, load, print_warnings
         from gustform_cli.model_report import as_json, as_text
         from gustform_codegen.report import model_report
 
-        model = link(load(scenario, overrides or []))
+        assembled = load(scenario, overrides or [])
+        print_warnings(assembled)
+        model = link(assembled)
         report = model_report(model.built.linked)
         print(as_json(report, model) if json else as_text(report, model))
         if model_file is not None:

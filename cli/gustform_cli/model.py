@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,6 +31,12 @@ class Model:
 def load(file: Path, overrides: Sequence[str] = ()) -> Assembled:
     """The assembled scenario in `file`. Raises ErrorList or GustformError with places in the file."""
     return assemble(document.read(file, overrides))
+
+
+def print_warnings(assembled: Assembled) -> None:
+    """What is to be known of a scenario before it runs, on stderr."""
+    for text in assembled.warnings:
+        print(f"warning: {text}", file=sys.stderr)
 
 
 def link(assembled: Assembled) -> Model:

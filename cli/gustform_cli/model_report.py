@@ -16,6 +16,7 @@ def as_json(report: ModelReport, model: Model) -> str:
             "compiled_types": model.built.compilations,
             "build_seconds": model.built.seconds,
             "channels": len(model.channels),
+            "scenario_warnings": model.assembled.warnings,
         },
         indent=2,
     )

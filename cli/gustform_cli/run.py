@@ -142,6 +142,7 @@ class Run:
             solver=solver_figures(statistics),
             frequency=self.watch.summary(self.every) if self.watch is not None else None,
             trips=self.trips.times,
+            warnings=tuple(self.model.assembled.warnings),
         )
         file = writer.finish(status, summary.as_dict()) if writer is not None else None
         return Ended(summary, file, error)
@@ -166,8 +167,9 @@ class Run:
         simulation.set_option("kinks", float(run.limiters == "locate"))
         if run.atol is not None:
             simulation.set_option("atol", run.atol)
-        if run.max_step is not None:
-            simulation.set_option("max_step", run.max_step)
+        longest = assembled.longest_step if run.max_step is None else min(run.max_step, assembled.longest_step)
+        if math.isfinite(longest):
+            simulation.set_option("max_step", longest)
         for number, series in enumerate(self.table.series):
             if series.name in assembled.readers:
                 simulation.set_series_reader(number, assembled.readers[series.name])
@@ -200,6 +202,7 @@ def _attributes(model: Model) -> dict[str, str]:
         "aliases": json.dumps(short_aliases(model.aliases, assembled.counts)),
         "events": json.dumps([{"at": e.at, "set": e.set} for e in assembled.scenario.events]),
         "frequency_channel": assembled.frequency or "",
+        "warnings": json.dumps(assembled.warnings),
         "versions": json.dumps(versions()),
     }
 

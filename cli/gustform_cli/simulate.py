@@ -11,7 +11,7 @@ from pathlib import Path
 
 from gustform.language.errors import GustformError
 from gustform_cli.interrupt import Interrupt
-from gustform_cli.model import link, load, placed
+from gustform_cli.model import link, load, placed, print_warnings
 from gustform_cli.progress import RunProgress
 from gustform_cli.result import RESULT, prepare_folder
 from gustform_cli.run import Ended, Run
@@ -38,6 +38,7 @@ def simulate(file: Path, out: Path, overrides: Sequence[str], interrupt: Interru
     results so far written."""
     begin = time.perf_counter()
     assembled = load(file, overrides)
+    print_warnings(assembled)
     prepare_folder(out)
     model = link(assembled)
     linked = model.built.linked

@@ -64,6 +64,7 @@ class Summary:
     solver: dict[str, int] = field(default_factory=dict)
     frequency: dict[str, float | None] | None = None
     trips: Mapping[str, float] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
 
     @property
     def real_time_factor(self) -> float:
@@ -71,7 +72,7 @@ class Summary:
         return self.simulated_seconds / self.wall_seconds if self.wall_seconds > 0.0 else 0.0
 
     def as_dict(self) -> dict[str, Any]:
-        """The keys of summary.json, flat but for `frequency` and `trips`."""
+        """The keys of summary.json, flat but for `frequency`, `trips` and `warnings`."""
         result: dict[str, Any] = {
             "status": self.status,
             "simulated_seconds": self.simulated_seconds,
@@ -88,4 +89,6 @@ class Summary:
             result["trips"] = dict(self.trips)
         if self.message is not None:
             result["message"] = self.message
+        if self.warnings:
+            result["warnings"] = list(self.warnings)
         return result

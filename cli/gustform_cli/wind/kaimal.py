@@ -1,7 +1,8 @@
 """The Kaimal spectrum and the normal turbulence model of IEC 61400-1 (ed. 3, 6.3.1.3 and annex B.2).
 
 S(f) = 4 sigma^2 (L/U) / (1 + 6 f L/U)^(5/3)        one-sided, (m/s)^2/Hz
-sigma_1 = I_ref (0.75 U + 5.6 m/s)                   I_ref = 0.16 (A), 0.14 (B), 0.12 (C)
+sigma_1 = I_ref (0.75 U + 5.6 m/s)                   I_ref = 0.16 (A), 0.14 (B), 0.12 (C); 90 % quantile
+E(sigma_1) = I_ref (0.75 U + 3.8 m/s)                the mean of the same distribution
 L_1 = 8.1 Lambda_1,  Lambda_1 = 0.7 z below 60 m, 42 m above
 """
 
@@ -15,9 +16,10 @@ from numpy.typing import NDArray
 REFERENCE_INTENSITY = {"A": 0.16, "B": 0.14, "C": 0.12}
 
 
-def standard_deviation(turbulence_class: str, mean: float) -> float:
-    """sigma_1, m/s, of the longitudinal wind at hub height for mean wind `mean`, m/s."""
-    return REFERENCE_INTENSITY[turbulence_class] * (0.75 * mean + 5.6)
+def standard_deviation(turbulence_class: str, mean: float, level: str = "quantile_90") -> float:
+    """sigma_1, m/s, of the longitudinal wind at hub height for mean wind `mean`, m/s: the 90 % quantile that loads are
+    calculated for, or the mean that energy is."""
+    return REFERENCE_INTENSITY[turbulence_class] * (0.75 * mean + (5.6 if level == "quantile_90" else 3.8))
 
 
 def length_scale(hub_height: float) -> float:

@@ -120,7 +120,7 @@ def test_the_good_one_is_good() -> None:
         ("speed: 8 m/s", "speed: 1 m/s", "GF2020", "5:7", "cut-in"),
         ("{type: constant, speed: 8 m/s}", "{type: turbulence, mean: 8 m/s, class: D}", "GF2204", "9:46", "A, B or C"),
         ("{type: constant, speed: 8 m/s}", "{type: turbulence, mean: 8 m/s, seed: -1}", "GF2003", "9:45", "seed"),
-        ("{type: constant, speed: 8 m/s}", "{type: file, path: no.csv}", "GF2202", "5:7", "wind_speed"),
+        ("{type: constant, speed: 8 m/s}", "{type: file, path: no.csv}", "GF2501", "no.csv", "readable"),
         # events
         ("load.active: 120 MW", "load.activ: 120 MW", "GF2405", "11:22", "'activ'"),
         ("load.active: 120 MW", "load: 120 MW", "GF2405", "11:22", "component.parameter"),
@@ -228,10 +228,6 @@ def test_a_wind_file_is_found_beside_the_scenario(tmp_path: Path) -> None:
     (tmp_path / "wind.csv").write_text("t,v\n0,8\n50,9\n")
     text = changed("{type: constant, speed: 8 m/s}", "{type: file, path: wind.csv, columns: {time: t, speed: v}}")
     (error,) = faults(text, file=str(tmp_path / "s.yaml"))
-    assert error.code == "GF2202", "nobody guesses the operating point from a file"
-    assert "components.wt.wind_speed" in error.message
-    text = text.replace("aggregate: 10", "aggregate: 10, wind_speed: 8 m/s")
-    (error,) = faults(text, file=str(tmp_path / "s.yaml"))
     assert error.code == "GF2506"
     assert "it ends at 50 s" in error.message
     (error,) = faults(text.replace("wind.csv", "no.csv"), file=str(tmp_path / "s.yaml"))
@@ -240,5 +236,10 @@ def test_a_wind_file_is_found_beside_the_scenario(tmp_path: Path) -> None:
     assert error.place.file == str(tmp_path / "no.csv")
     held = text.replace("path: wind.csv", "path: wind.csv, on_end: hold")
     assert faults(held, file=str(tmp_path / "s.yaml")) == []
+    assembled = assemble(document.parse(held, str(tmp_path / "s.yaml")))
+    assert assembled.system.components["wt"].value("wind_speed") == 8.5, "the mean of the file as far as it goes"
+    assert ["ends at 50 s" in text for text in assembled.warnings] == [True]
+    stated = assemble(document.parse(held, str(tmp_path / "s.yaml"), ["wt.wind_speed=7 m/s"]))
+    assert stated.system.components["wt"].value("wind_speed") == 7.0
     (error,) = faults(text.replace("path: wind.csv", "path: wind.csv, units: {time: m}"), file=str(tmp_path / "s.yaml"))
     assert error.code == "GF2303"
