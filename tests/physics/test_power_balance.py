@@ -39,12 +39,12 @@ REACTIVE: Terms = {
 }
 
 
-def radial_system() -> System:
+def radial_system(fidelity: str) -> System:
     """A plant, turbines and a load at one bus; a line and a transformer lead to loads on two others."""
     s = System()
     s.add("bus", Bus())
     s.add("sg", SynchronousGenerator(rating=S_N))
-    s.add("wt", PmsgTurbine(aggregate=10, wind_speed=10.0, curtailment=0.1))
+    s.add("wt", PmsgTurbine(aggregate=10, wind_speed=10.0, curtailment=0.1, fidelity=fidelity))
     s.add("load", ConstantPowerLoad(active=70e6, reactive=5e6))
     s.add("line", Line(R=0.2, X=0.9))
     s.add("far", Bus())
@@ -143,9 +143,10 @@ def audit(plant: Ready, values: Channels) -> None:
         assert np.max(np.abs(wrong)) < TOLERANCE * S_N, name
 
 
-@pytest.fixture(scope="module")
-def plant(cache: KernelCache) -> Ready:
-    return ready(radial_system(), cache)
+@pytest.fixture(scope="module", params=["lossless", "rms", "dq"])
+def plant(request: pytest.FixtureRequest, cache: KernelCache) -> Ready:
+    """The turbine in each fidelity."""
+    return ready(radial_system(request.param), cache)
 
 
 def test_every_connector_is_in_balance_at_random_states(plant: Ready) -> None:
@@ -161,5 +162,5 @@ def test_every_connector_is_in_balance_at_random_states(plant: Ready) -> None:
 
 
 def test_every_connector_stays_in_balance_along_a_run(plant: Ready) -> None:
-    # rtol 1e-10: between steps the solver interpolates, and the network's equations hold to its tolerance only
-    audit(plant, everything(plant, np.linspace(0.0, 10.0, 101), rtol=1e-10))
+    # rtol 2e-11: between steps the solver interpolates, and the network's equations hold to its tolerance only
+    audit(plant, everything(plant, np.linspace(0.0, 10.0, 101), rtol=2e-11))
