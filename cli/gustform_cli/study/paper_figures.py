@@ -57,7 +57,9 @@ _SAME_SCALE = ("sg.frequency", "wt.frequency")
 def case_figure(wind: int, results: Mapping[Case, Path], frequency: Frequency, file: Path) -> Path:
     """The panels (a)-(f) at one wind speed, m/s, from the result files of its cases."""
     cases = [case for case in results if case.wind == wind]
-    figure = _figure(8.6, 7.3)
+    # What fits is known here; to find it out takes matplotlib as long as drawing.
+    figure = _figure(8.6, 7.3, arranged=False)
+    figure.subplots_adjust(left=0.085, right=0.985, bottom=0.06, top=0.925, wspace=0.2, hspace=0.2)
     axes = figure.subplots(3, 2, sharex=True)
     for letter, axis, panel in zip("abcdef", axes.ravel(), _PANELS, strict=True):
         axis.set_title(f"({letter})  {panel.title}")
@@ -87,13 +89,14 @@ def case_figure(wind: int, results: Mapping[Case, Path], frequency: Frequency, f
     _write_nadirs(axes[1, 0], cases, frequency)
     for axis in axes[-1]:
         axis.set_xlabel("time (s)")
+    figure.align_ylabels()
     _heading(figure, f"20 MW load step at {wind} m/s", cases, axes[0, 0])
     return save(figure, file)
 
 
 def eigenvalue_figure(found: Mapping[Case, Modes], file: Path) -> Path:
     """The eigenvalues of all cases: the whole plane on logarithmic axes, and the slow modes."""
-    figure = _figure(8.6, 4.3)
+    figure = _figure(8.6, 4.3, arranged=True)
     left, right = figure.subplots(1, 2)
     for case, modes in found.items():
         # Pairs are symmetric; the angle that everything is measured against is no mode of the system.
@@ -126,11 +129,11 @@ def eigenvalue_figure(found: Mapping[Case, Modes], file: Path) -> Path:
     return save(figure, file)
 
 
-def _figure(width: float, height: float) -> Figure:
+def _figure(width: float, height: float, *, arranged: bool) -> Figure:
     import matplotlib as mpl  # half a second: after the runs
     from matplotlib.figure import Figure
 
-    mpl.rcParams.update(STYLE)
+    mpl.rcParams.update({**STYLE, "figure.constrained_layout.use": arranged})
     return Figure(figsize=(width, height))
 
 
@@ -158,7 +161,8 @@ def _heading(figure: Figure, text: str, cases: Sequence[Case], axis: Axes | None
     """The title at the left, the controls (and, without an axis to take them from, the wind speeds) at the right."""
     from matplotlib.lines import Line2D
 
-    figure.suptitle(text, x=0.012, ha="left", fontsize=12, fontweight="bold")
+    top = {"y": 0.993} if axis is not None else {}  # where matplotlib does not arrange it, it would stand too low
+    figure.suptitle(text, x=0.012, ha="left", fontsize=12, fontweight="bold", **top)
     shown = [control for control in CONTROLS if any(case.control is control for case in cases)]
     if axis is not None:
         handles = [Line2D([], [], **_LINES[control]) for control in shown]
