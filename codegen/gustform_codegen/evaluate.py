@@ -6,6 +6,7 @@ kernels with CasADi.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from typing import Any
 
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gustform.language.table import evaluate_spline
+from gustform_codegen.column_function import ColumnFunction
 from gustform_codegen.emit.kernel import pattern_and_jacobian
 from gustform_codegen.unit_type import UnitType
 
@@ -49,18 +51,23 @@ class TypeEvaluator:
         self._arguments = [self.y, self.yp, self.w, self.u, self.d, self.p, self._calls]
         self._residual = self._function("residual", [self._values])
         self._call_arguments = [self._function(f"call{k}", [c.x, c.y]) for k, c in enumerate(unit.calls)]
-        self._jacobian: Any = None
+        self._jacobian: ColumnFunction | None = None
         self._initial_pattern: tuple[NDArray[np.int64], NDArray[np.int64]] | None = None
 
-    def _function(self, name: str, expressions: list[Any]) -> Any:
-        arguments = [a if a.numel() else ca.SX(0, 1) for a in self._arguments]
-        return ca.Function(name, arguments, expressions)
+    def over(self, table: Ints, splines: Sequence[dict[str, Any]]) -> TypeEvaluator:
+        """The same functions over the tables of other instances."""
+        other = copy.copy(self)
+        other.table, other.splines = table, splines
+        return other
+
+    def _function(self, name: str, expressions: list[Any]) -> ColumnFunction:
+        return ColumnFunction(name, self._arguments, expressions)
 
     def _call_values(self, arguments: list[Array]) -> Array:
         n = arguments[0].shape[1]
         values = np.zeros((3 * len(self.unit.calls), n))
         for k, call in enumerate(self.unit.calls):
-            x, y = self._evaluate(self._call_arguments[k], [*arguments, values])
+            x, y = self._call_arguments[k]([*arguments, values])
             assert self.table is not None
             numbers = self.table[:, call.table]
             for number in np.unique(numbers):
@@ -68,18 +75,10 @@ class TypeEvaluator:
                 values[3 * k : 3 * k + 3, some] = evaluate_spline(self.splines[number], x[0, some], y[0, some])
         return values
 
-    @staticmethod
-    def _evaluate(function: Any, arguments: list[Array]) -> list[Array]:
-        n = arguments[0].shape[1]
-        mapped = function.map(n) if n > 1 else function
-        result = mapped(*[ca.DM(a) for a in arguments])
-        items = [result] if isinstance(result, ca.DM) else list(result)
-        return [np.asarray(ca.densify(item)) for item in items]
-
     def residual(self, y: Array, yp: Array, w: Array, u: Array, d: Array, p: Array) -> Array:
         """Rows, then flows, then initial equations, for each instance (columns)."""
         arguments = [y, yp, w, u, d, p]
-        return self._evaluate(self._residual, [*arguments, self._call_values(arguments)])[0]
+        return self._residual([*arguments, self._call_values(arguments)])[0]
 
     def total_jacobian(self, values: Any, columns: Any) -> Any:
         """The derivative of `values` with respect to the symbols in `columns`, also through the tables."""
@@ -119,11 +118,11 @@ class TypeEvaluator:
         if self._jacobian is None:
             return np.zeros((0, y.shape[1]))
         arguments = [y, yp, w, u, d, p]
-        return self._evaluate(self._jacobian, [*arguments, self._call_values(arguments)])[0]
+        return self._jacobian([*arguments, self._call_values(arguments)])[0]
 
     def kernel_jacobian(self, y: Array, yp: Array, w: Array, u: Array, d: Array, p: Array, cj: float) -> Array:
         """What the compiled kernel's `jacobian` gives, by CasADi (for tests)."""
         _, _, entries = pattern_and_jacobian(self.unit, self._cj)
         expression = ca.substitute(ca.vertcat(*entries), self._cj, ca.SX(cj))
         arguments = [y, yp, w, u, d, p]
-        return self._evaluate(self._function("kernel", [expression]), [*arguments, self._call_values(arguments)])[0]
+        return self._function("kernel", [expression])([*arguments, self._call_values(arguments)])[0]

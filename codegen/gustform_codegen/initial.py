@@ -1,4 +1,4 @@
-"""The steady-state start: all derivatives zero, solved by Ipopt with the declared bounds.
+"""The steady-state start: all derivatives zero, solved by Newton's method or else by Ipopt with the declared bounds.
 
 Unknowns are the system's unknowns, the derivatives of `fixed` states (whose values are kept) and the free parameters;
 equations are the residual rows, the flow sums and the initial equations. Residuals and the sparse Jacobian come from
@@ -9,7 +9,9 @@ symbolic problem.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
+from weakref import WeakSet
 
 import casadi as ca
 import numpy as np
@@ -18,7 +20,9 @@ from numpy.typing import NDArray
 from gustform.language.errors import GustformError
 from gustform_codegen.evaluate import Array, TypeEvaluator
 from gustform_codegen.link import Linked, LinkedType
+from gustform_codegen.newton import newton
 from gustform_codegen.table import SystemTable
+from gustform_codegen.unit_type import UnitType
 
 _ACCEPT = 1e-7  # largest scaled residual that still counts as solved
 
@@ -33,13 +37,21 @@ class SteadyState:
     free: dict[str, float]
 
 
+@lru_cache(maxsize=128)
+def _evaluator(unit: UnitType) -> TypeEvaluator:
+    """The evaluator of a unit type with its derivatives; made once in a process."""
+    evaluator = TypeEvaluator(unit)
+    evaluator.initial_pattern()
+    return evaluator
+
+
 class _Problem:
     """Maps between Ipopt's vector and the arguments of each type."""
 
     def __init__(self, linked: Linked) -> None:
         self.linked = linked
         splines = [lookup.spline for lookup in linked.table.tables]
-        self.evaluators = [TypeEvaluator(t.unit, t.table.table, splines) for t in linked.types]
+        self.evaluators = [_evaluator(t.unit).over(t.table.table, splines) for t in linked.types]
         n = linked.table.n_unknowns
         self.n = n
         scale: list[float] = list(linked.table.nominal)
@@ -246,7 +258,9 @@ class _Jacobian(ca.Callback):
 def steady_state(linked: Linked, max_iterations: int = 300) -> SteadyState:
     """Solve for the steady state; GF5001 with the worst rows and the bounds that are hit when there is none."""
     for t in linked.types:
-        _refuse_computed_from_free(t)
+        if t.unit not in _looked_at:
+            _refuse_computed_from_free(t)
+            _looked_at.add(t.unit)
     problem = _Problem(linked)
     if problem.n_rows != problem.n_columns - len(problem.fixed):
         raise GustformError(
@@ -260,6 +274,34 @@ def steady_state(linked: Linked, max_iterations: int = 300) -> SteadyState:
     np.maximum.at(row_size, problem.entry_row, np.nan_to_num(entries))
     row_scale = 1.0 / np.where(row_size > 0, row_size, 1.0)
 
+    def slopes(scaled: Array) -> Array:
+        dense = np.zeros((problem.n_rows, problem.n_columns))
+        values = problem.jacobian(scaled * problem.scale)
+        dense[problem.entry_row, problem.entry_column] = (
+            values * row_scale[problem.entry_row] * problem.scale[problem.entry_column]
+        )
+        return dense
+
+    found = newton(
+        lambda scaled: problem.residual(scaled * problem.scale) * row_scale,
+        slopes,
+        x0,
+        problem.low / problem.scale,
+        problem.high / problem.scale,
+    )
+    if found is not None:
+        solution, iterations, status = found[0] * problem.scale, found[1], ""
+    else:
+        solution, iterations, status = _by_ipopt(problem, x0, row_scale, max_iterations)
+    left = problem.residual(solution) * row_scale
+    largest = float(np.max(np.abs(left))) if left.size else 0.0
+    if not np.isfinite(largest) or largest > _ACCEPT:
+        _report_failure(problem, solution, left, status)
+    return _in_place(linked, problem, solution, iterations, largest)
+
+
+def _by_ipopt(problem: _Problem, x0: Array, row_scale: Array, max_iterations: int) -> tuple[Array, int, str]:
+    """What Ipopt comes to from the scaled start x0, with its iterations and how it ended."""
     residual, jacobian = _Residual(problem, row_scale), _Jacobian(problem, row_scale)
     x = ca.MX.sym("x", problem.n_columns)
     sigma_and_multipliers = [
@@ -292,11 +334,10 @@ def steady_state(linked: Linked, max_iterations: int = 300) -> SteadyState:
     )
     answer = solver(x0=x0, lbx=problem.low / problem.scale, ubx=problem.high / problem.scale, lbg=0, ubg=0)
     solution = np.asarray(answer["x"]).ravel() * problem.scale
-    left = problem.residual(solution) * row_scale
-    largest = float(np.max(np.abs(left))) if left.size else 0.0
-    if not np.isfinite(largest) or largest > _ACCEPT:
-        _report_failure(problem, solution, left, str(solver.stats()["return_status"]))
-    return _in_place(linked, problem, solution, int(solver.stats()["iter_count"]), largest)
+    return solution, int(solver.stats()["iter_count"]), str(solver.stats()["return_status"])
+
+
+_looked_at: WeakSet[UnitType] = WeakSet()  # types of which no parameter is computed from a free one
 
 
 def _refuse_computed_from_free(t: LinkedType) -> None:

@@ -115,7 +115,7 @@ class _Derivatives(TypeEvaluator):
         """Values (rows, flows, recorded, limiters) and entries of their derivatives, per instance (columns)."""
         if self.size == 0:
             return np.zeros((0, arguments[0].shape[1])), np.zeros((0, arguments[0].shape[1]))
-        both = self._evaluate(self._all, [*arguments, self._call_values(arguments)])[0]
+        both = self._all([*arguments, self._call_values(arguments)])[0]
         return both[: self.size], both[self.size :]
 
     def at(self, arguments: list[Array], nominal: Array) -> tuple[Array, Array, NDArray[np.bool_]]:

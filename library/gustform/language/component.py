@@ -119,6 +119,7 @@ class Component:
                 modifiers[name] = declaration.check(value, f"{type(self).__name__}.{name}")
         self._modifiers: dict[str, Any] = modifiers
         self._parts: dict[str, Component] = {}
+        self._numbers: dict[str, Any] = {}  # values of parameters found so far
         self._computing: set[str] = set()  # parameters whose value is being computed right now
 
     def _check_part(self, part: Part, value: Any) -> None:
@@ -170,6 +171,7 @@ class Component:
                     child._modifiers.setdefault(key, value)
             child._parent = self
             child._path = f"{self._path}.{name}" if self._path else name
+            child._numbers.clear()  # what its constructor looked at knew no parent
             self._parts[name] = child
         return self._parts[name]
 
@@ -190,6 +192,8 @@ class Component:
 
     def value(self, name: str) -> Any:
         """The number of a parameter: given, bound by the parent, or the default. GF2004 if there is none."""
+        if name in self._numbers:
+            return self._numbers[name]
         declaration = self._declarations[name]
         assert isinstance(declaration, Parameter)
         label = f"{self._path}.{name}" if self._path else name
@@ -208,7 +212,8 @@ class Component:
                 f"{type(self).__name__}.{label} is not given ({declaration.description}, {declaration.unit})",
                 hint=f"{name}: a number in {declaration.unit}",
             )
-        return declaration.check(given, label)
+        self._numbers[name] = declaration.check(given, label)
+        return self._numbers[name]
 
     def is_bound(self, name: str) -> bool:
         """Whether the parent sets this parameter by a function of its own parameters (and nobody overrode it)."""

@@ -252,6 +252,7 @@ def elaborate(component: Component) -> Elaborated:
     def view_of(numeric: Component) -> Component:
         view = object.__new__(type(numeric))
         view._modifiers, view._parts, view._path = numeric._modifiers, {}, numeric.path
+        view._numbers = {}
         scope = Scope(elaborated, numeric)
         view._scope = scope
         scope.declare()
