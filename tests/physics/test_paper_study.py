@@ -204,6 +204,25 @@ def test_the_report_says_where_the_published_filter_fails(done: tuple[Path, Resu
         assert table in report
 
 
+def test_the_page_shows_what_comes_out(root: Path, summary: dict[str, Any], done: tuple[Path, Result]) -> None:
+    """Rows of docs/paper.md against those of the report, to the last digit that the page shows."""
+
+    def rows(text: str) -> dict[str, list[str]]:
+        cells = [[cell.strip() for cell in line.split("|")[1:-1]] for line in text.splitlines() if line.startswith("|")]
+        return {row[0]: row[1:] for row in cells}
+
+    page = (root / "docs" / "paper.md").read_text()
+    shown, found = rows(page[page.index("## What is published") :]), rows((done[0] / "report.md").read_text())
+    assert len(shown) > 20
+    for name, (printed, reproduced) in shown.items():
+        if set(name) == {"-"} or name == "quantity":
+            continue
+        digits = len(reproduced.partition(".")[2])
+        assert float(printed) == float(found[name][0]), name
+        # half of the last digit, and as much for solvers that differ
+        assert float(reproduced) == pytest.approx(float(found[name][1]), abs=10.0**-digits), name
+
+
 # ---- another fidelity, Ctrl-C, errors -------------------------------------------------------------------------------
 def test_json_on_stdout_and_old_files_go(tmp_path: Path, summary: dict[str, Any]) -> None:
     (tmp_path / "cases").mkdir()
@@ -214,6 +233,23 @@ def test_json_on_stdout_and_old_files_go(tmp_path: Path, summary: dict[str, Any]
     assert found.pop("paths")["summary"] == str(tmp_path / "summary.json")
     assert found == summary, "also with one case at a time"
     assert not list((tmp_path / "cases").glob("*.part"))
+
+
+@pytest.mark.parametrize("fidelity", ["dq", "lossless"])
+def test_another_fidelity(tmp_path: Path, summary: dict[str, Any], fidelity: str) -> None:
+    result = study("--out", tmp_path, "--fidelity", fidelity, "--json")
+    assert result.exit_code == 0, result.stderr
+    found = json.loads(result.stdout)
+    assert found["gains"] == summary["gains"]
+    report = (tmp_path / "report.md").read_text()
+    assert f"Fidelity `{fidelity}`" in report
+    assert "**unstable**" in report, "the published T_dc, at rms where lossless has no filter"
+    for wind in WINDS:
+        rms = at(summary, f"frequency.gfm_fr.{wind}.nadir_hz")
+        # 5 mHz is the bound for rms and dq; another governor and machine make 11 to 30 mHz at lossless
+        assert at(found, f"frequency.gfm_fr.{wind}.nadir_hz") == pytest.approx(
+            rms, abs=5e-3 if fidelity == "dq" else 0.1
+        )
 
 
 def test_interrupted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

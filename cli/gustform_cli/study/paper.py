@@ -18,7 +18,7 @@ from gustform_cli.run import Ended
 from gustform_cli.study import paper_findings as findings
 from gustform_cli.study import published
 from gustform_cli.study.droop_map import draw as draw_droop_map
-from gustform_cli.study.paper_cases import CASES, GFM_FR, WINDS, Case, build, run
+from gustform_cli.study.paper_cases import CASES, GFM_FR, TURBINE, WINDS, Case, build, run
 from gustform_cli.study.paper_report import closing, report
 from gustform_codegen.modes import modes
 
@@ -66,11 +66,9 @@ def paper(out: Path, fidelity: str, jobs: int, interrupt: Interrupt) -> Study:
     _raise_failures(ended)
     results = {case: end.result for case, end in ended.items()}
 
-    variants = {case: findings.linear(case, fidelity) for case in CASES}
-    found = {case: modes(one.linear("wt", {})) for case, one in variants.items()}
-    slowest = Case(GFM_FR, WINDS[0])
+    found = {case: modes(findings.linear(case, fidelity).linear(TURBINE, {})) for case in CASES}
     T_dc = next(p.value for p in published.CONTROL if p.key == "control.T_dc")
-    stability = findings.stability(slowest, variants[slowest], [T_dc])
+    stability = findings.stability(Case(GFM_FR, WINDS[0]), fidelity, [T_dc])
     eigenvalues: dict[str, dict[str, list[list[float]]]] = {}
     for case, one in found.items():
         eigenvalues.setdefault(case.control.key, {})[str(case.wind)] = findings.as_pairs(one)

@@ -20,6 +20,7 @@ from gustform_codegen.modes import Modes, modes
 
 # m/s, finer where the droop falls at rated wind (11.23 m/s); `gustform study droop-map` has a finer grid everywhere
 MAP_WINDS = tuple(sorted({4.0 + 0.25 * k for k in range(45)} - {11.25} | {11.2, 11.3}))
+LOSSLESS = "lossless"  # the fidelity without filters
 _SEED = 1  # of the random sets: the report is the same every time
 
 
@@ -28,6 +29,7 @@ class Stability:
     """Where the rightmost eigenvalue of one case lies, 1/s, for a time constant of the DC voltage filters, s."""
 
     case: Case
+    fidelity: str
     T_dc: float
     rightmost: complex
     limit: float  # K_d/K_theta, s
@@ -73,9 +75,10 @@ def gains(built: Iterable[Built]) -> dict[str, dict[str, float]]:
 def linear(case: Case, fidelity: str) -> Variants:
     """A case to be linearised in its steady state before the load step.
 
-    With governor set B: inside its dead band the other one does nothing, and the frequency is neutral.
+    With governor set B: inside its dead band the other one does nothing, and the frequency is neutral. The governor of
+    lossless has no dead band.
     """
-    return Variants(SCENARIO, [*case.overrides(fidelity), *SET_B])
+    return Variants(SCENARIO, [*case.overrides(fidelity), *(SET_B if fidelity != LOSSLESS else ())])
 
 
 def as_pairs(found: Modes) -> list[list[float]]:
@@ -83,13 +86,16 @@ def as_pairs(found: Modes) -> list[list[float]]:
     return [[float(value.real), float(value.imag)] for value in found.eigenvalues]
 
 
-def stability(case: Case, variants: Variants, time_constants: Sequence[float]) -> list[Stability]:
-    """The rightmost eigenvalue of a case with dual-port control, with other filters of the DC voltage, s."""
+def stability(case: Case, fidelity: str, time_constants: Sequence[float]) -> list[Stability]:
+    """The rightmost eigenvalue of a case with dual-port control, with its own and other filters of the DC voltage (s);
+    at rms instead of lossless, which has no filter."""
+    fidelity = "rms" if fidelity == LOSSLESS else fidelity
+    variants = linear(case, fidelity)
     control = variants.component(TURBINE).part("control")
     assert isinstance(control, DualPort)
     limit = float(control.K_d_gsc / control.K_gsc)
     return [
-        Stability(case, T_dc, modes(variants.linear(TURBINE, {"control.T_dc": T_dc})).rightmost, limit)
+        Stability(case, fidelity, T_dc, modes(variants.linear(TURBINE, {"control.T_dc": T_dc})).rightmost, limit)
         for T_dc in (float(control.T_dc), *time_constants)
     ]
 

@@ -47,16 +47,16 @@ _FIDELITY = {
 
 _FREQUENCY_NOTE = """Nadir: the lowest frequency of the synchronous generator after the step. The last three columns are
 60 s after the step. Above rated wind GFM MPPT has a pitch gain too (beta_del is not 0), so that the turbines give more
-than their rated power for half a minute, until the power limiter has taken it back."""
+than their rated power for some 20 s, until the power limiter has taken it back."""
 
 _TABLES_NOTE = "Tables are numbered as in the LaTeX source of the paper. Allowed differences: project notes."
 
-_STABILITY_NOTE = """The rightmost eigenvalue before the load step, {case}, with governor set B, without dead band
-(inside one the frequency is neutral). The published T_dc = {published:g} s with the published K_d and K_theta violates
-T_dc < K_d/K_theta = {limit:.4f} s, which the filter needs and the theorem does not say, because it assumes T_dc = 0.
-The study uses {used:g} s. The eigenvalues of all cases are in `summary.json`; that of the reference angle is 0 and no
-mode. Where a limiter stands at its bend in the steady state (the speed limiter at 1.2 pu), its slope is the mean of
-both sides."""
+_STABILITY_NOTE = """The rightmost eigenvalue before the load step, {case}, fidelity `{fidelity}`, with governor
+set B, without dead band (inside one the frequency is neutral). The published T_dc = {published:g} s with the published
+K_d and K_theta violates T_dc < K_d/K_theta = {limit:.4f} s, which the filter needs and the theorem does not say,
+because it assumes T_dc = 0. The study uses {used:g} s. The eigenvalues of all cases are in `summary.json`; that of the
+reference angle is 0 and no mode. Where a limiter stands at its bend in the steady state (the speed limiter at 1.2 pu),
+its slope is the mean of both sides."""
 
 _DROOP_NOTE = """The smallest droop m_p, %, that the three limits of section V-B allow for a frequency deviation of
 {reserve:g} pu, speed first, over eta = 1 - curtailment and wind speed; `-`: no operating point. All of the map is in
@@ -153,6 +153,7 @@ def _stability(found: Sequence[Stability]) -> str:
     ]
     note = _STABILITY_NOTE.format(
         case=f"{case.control.label} at {case.wind} m/s",
+        fidelity=found[0].fidelity,
         limit=found[0].limit,
         used=found[0].T_dc,
         published=found[-1].T_dc,
