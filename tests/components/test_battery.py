@@ -42,8 +42,6 @@ FLAGS = ["-std=c11", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow
 ALONE = {"OneMass": 1}
 # Units that a system wires to the speed of a machine; there the input is an unknown of the system, not a constant.
 FRAMED = ("PmsgTurbine", "SynchronousGenerator")
-# Above the rotor's highest pitch angle: Ipopt refuses its bounds where operating_point.py should.
-REPORTED = {("PmsgTurbine", "beta_min")}
 
 
 def tree(component: Component) -> list[Component]:
@@ -293,10 +291,6 @@ def test_extreme_parameters_give_an_error_or_finite_equations(name: str) -> None
             except GustformError:
                 refused += 1
                 continue
-            except RuntimeError:
-                if (name.partition(",")[0], path) in REPORTED:
-                    continue
-                raise
             splines = [t.spline() for t in at.tables]
             numbers = np.arange(len(splines), dtype=np.int32)[None, :]
             evaluator = evaluators.setdefault(id(unit), TypeEvaluator(unit, numbers, splines))

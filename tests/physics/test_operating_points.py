@@ -104,3 +104,8 @@ def test_table_rotor_has_nearly_the_points_of_the_closed_form() -> None:
         assert b.omega_del == pytest.approx(a.omega_del, abs=2e-3)
         assert b.beta_del == pytest.approx(a.beta_del, abs=2e-2)
         assert b.power == pytest.approx(a.power, rel=1e-3)
+
+
+def test_a_lowest_pitch_outside_the_known_cp_is_refused() -> None:
+    with pytest.raises(GustformError, match=r"beta_min must be less than 12 deg, .*; got 20"):
+        PmsgTurbine(wind_speed=8.0, curtailment=0.1, beta_min=20.0).operating_point()

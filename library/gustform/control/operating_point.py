@@ -72,7 +72,8 @@ def operating_point(rotor: Rotor, wind: float, curtailment: float, limits: Limit
     """The operating point of a rotor in constant wind, `curtailment` = 1 - eta held back.
 
     Raises GF2020 (wind outside cut-in ... cut-out), GF2021 (curtailment outside 0 ... 1), GF2022 (speed cannot hold
-    back so much within the known Cp), GF2023 (pitch cannot), each naming the limit.
+    back so much within the known Cp), GF2023 (pitch cannot), GF2025 (beta_min outside the known Cp), each naming the
+    limit.
     """
     return _operating_point(
         cp_solver(rotor), float(rotor.radius), rotor.power_per_cube(), float(wind), float(curtailment), limits
@@ -147,6 +148,13 @@ def _operating_point(
     if error is not None:
         raise error
     eta, beta_min = 1.0 - curtailment, max(limits.beta_min, aero.pitches[0])
+    if beta_min >= aero.pitches[1]:
+        raise GustformError(
+            "GF2025",
+            f"beta_min must be less than {aero.pitches[1]:g} deg, up to which Cp of {aero.name} is known (lowest pitch "
+            f"angle, deg); got {limits.beta_min:g}",
+            hint="0 deg",
+        )
     lambda_mpp = aero.mpp(beta_min)
     cp_max = aero.value(lambda_mpp, beta_min)
     to_ratio = radius * limits.omega_base / wind  # tip speed ratio of 1 pu speed
