@@ -1,4 +1,4 @@
-"""What dual-port control promises of every steady state: deviations of frequency, DC voltage and speed in proportion."""
+"""What dual-port control promises of a steady state: deviations of frequency, DC voltage and speed in proportion."""
 
 from __future__ import annotations
 
