@@ -1,4 +1,4 @@
-"""The command `gustform`: simulate, check, linearise, design, study, info, plot, new.
+"""The command `gustform`: simulate, check, linearise, design, study, info, plot, report, new.
 
 Only what a command needs is loaded when it runs; `gustform --help` loads none of it. Exit codes: 0 done, 1 the model
 or the run failed, 2 usage or scenario, 130 interrupted.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import sys
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -179,6 +180,31 @@ def plot(
         from gustform_cli.figures import draw
 
         print(draw(result, out if out is not None else result.parent / "figure.png"))
+
+
+class Open(StrEnum):
+    """Whether a page is shown when it is written."""
+
+    never = "never"
+    browser = "browser"
+
+
+@app.command()
+def report(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="folder of a run, unfinished or not, or a campaign")],
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="page to write [DIR/report.html]")] = None,
+    show: Annotated[Open, typer.Option("--open", help="show the page in the browser")] = Open.never,
+) -> None:
+    """Write one self-contained HTML page with the figures and tables of a run or a campaign; prints its path."""
+    with guarded():
+        from gustform_cli.report.report import write_report
+
+        page = write_report(folder, out)
+        print(page)
+        if show is Open.browser:
+            import webbrowser
+
+            webbrowser.open(page.resolve().as_uri())
 
 
 @app.command()

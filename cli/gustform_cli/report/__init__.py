@@ -1,0 +1,1 @@
+"""`gustform report`: one self-contained HTML page for a run or a campaign."""
