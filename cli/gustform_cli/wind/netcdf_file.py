@@ -188,7 +188,6 @@ def _read(data: h5py.Dataset, rows: slice) -> NDArray[np.float64]:
     for name in ("_FillValue", "missing_value"):
         if name in data.attrs:
             values = np.where(raw == data.attrs[name], np.nan, values)
-    result: NDArray[np.float64] = values * float(data.attrs.get("scale_factor", 1.0)) + float(
-        data.attrs.get("add_offset", 0.0)
-    )
+    scale, offset = (np.ravel(data.attrs.get(*pair))[0] for pair in (("scale_factor", 1.0), ("add_offset", 0.0)))
+    result: NDArray[np.float64] = values * scale + offset
     return result
