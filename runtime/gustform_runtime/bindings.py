@@ -122,6 +122,10 @@ _SIGNATURES: dict[str, tuple[type | None, tuple[type, ...]]] = {
     "gust_sim_residual": (c_int, (_HANDLE, c_double, _NUMBERS, _NUMBERS, _NUMBERS)),
     "gust_sim_set_statistics": (c_int, (_HANDLE, _HANDLE, c_double)),
     "gust_sim_jacobian": (c_int, (_HANDLE, c_double, _NUMBERS, _NUMBERS, c_double, _NUMBERS)),
+    "gust_sim_checkpoint": (c_int, (_HANDLE, c_char_p)),
+    "gust_sim_checkpoint_bytes": (c_int, (_HANDLE, POINTER(c_void_p), POINTER(c_size_t))),
+    "gust_sim_restore": (c_int, (_HANDLE, c_char_p)),
+    "gust_sim_restore_bytes": (c_int, (_HANDLE, c_char_p, c_size_t)),
     "gust_stats_create": (
         c_int,
         (POINTER(StatsChannel), c_int32, c_int32, c_double, POINTER(_HANDLE), c_char_p, c_size_t),

@@ -1,6 +1,7 @@
 """One simulation of a model table: the C interface of gust_sim.h as a Python class."""
 
 import ctypes
+import os
 from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
@@ -184,6 +185,33 @@ class Simulation:
     def request_stop(self) -> None:
         """Make advance() return Status.STOP_REQUESTED after the current step; from any thread."""
         self._library.gust_sim_request_stop(self._open())
+
+    # -- checkpoints --------------------------------------------------------------------------------------------------
+
+    def checkpoint(self, path: Path | None = None) -> None:
+        """The state at the time reached, into a file that is replaced in one go, or for checkpoint_bytes() only.
+
+        The integrator starts anew here, in this run as in one that takes it up, so that both go on with the same bits.
+        Rows up to now have been handed over: write them to the disk first. RunError CHECKPOINT_FAILED leaves the last
+        file in place, and the simulation can go on."""
+        self._check(self._library.gust_sim_checkpoint(self._open(), None if path is None else os.fsencode(path)))
+
+    def checkpoint_bytes(self) -> bytes:
+        """The last checkpoint as bytes."""
+        start, size = ctypes.c_void_p(), ctypes.c_size_t()
+        code = self._library.gust_sim_checkpoint_bytes(self._open(), ctypes.byref(start), ctypes.byref(size))
+        if code != Status.OK:
+            raise RunError(Status(code), "no checkpoint has been made yet")
+        return ctypes.string_at(start.value or 0, size.value)
+
+    def restore(self, state: Path | bytes) -> None:
+        """After initialise(): go on from a checkpoint of the same table with the same options, sink interval and
+        statistics. statistics()["rows"] then says how many rows there were up to it."""
+        if isinstance(state, Path):
+            code = self._library.gust_sim_restore(self._open(), os.fsencode(state))
+        else:
+            code = self._library.gust_sim_restore_bytes(self._open(), state, len(state))
+        self._check(code)
 
     # -- look ---------------------------------------------------------------------------------------------------------
 

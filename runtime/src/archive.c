@@ -1,5 +1,6 @@
 #include "archive.h"
 
+#include <limits.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -106,11 +107,41 @@ void gust_archive_flag(gust_archive *archive, const char *name, bool *flag)
     *flag = number != 0;
 }
 
-void gust_archive_expect(gust_archive *archive, const char *name, double number)
+void gust_archive_ints(gust_archive *archive, const char *name, int *data, int64_t count)
+{
+    uint8_t *at = record(archive, name, TYPE_I64, count);
+    for (int64_t k = 0; at != NULL && k < count; ++k) {
+        int64_t number = data[k];
+        copy(archive, at + 8 * k, &number, sizeof number);
+        gust_archive_require(archive, name, number >= INT_MIN && number <= INT_MAX);
+        data[k] = archive->good ? (int)number : data[k];
+    }
+}
+
+static void go_foreign(gust_archive *archive, const char *name)
+{
+    archive->foreign = archive->foreign || archive->good;
+    go_bad(archive, name);
+}
+
+void gust_archive_same(gust_archive *archive, const char *name, double number)
 {
     double found = number;
     gust_archive_doubles(archive, name, &found, 1);
-    gust_archive_require(archive, name, found == number);
+    if (archive->good && found != number) {
+        go_foreign(archive, name);
+    }
+}
+
+void gust_archive_same_identity(gust_archive *archive, const char *name, uint64_t identity)
+{
+    int64_t own = 0;
+    memcpy(&own, &identity, sizeof own);
+    int64_t found = own;
+    gust_archive_longs(archive, name, &found, 1);
+    if (archive->good && found != own) {
+        go_foreign(archive, name);
+    }
 }
 
 void gust_archive_require(gust_archive *archive, const char *name, bool condition)

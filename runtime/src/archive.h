@@ -28,7 +28,8 @@ typedef struct gust_archive {
     uint8_t *bytes; /* belong to the caller; not written to when loading */
     size_t size;
     size_t at;
-    bool good; /* false after a record that was not the expected one; the rest is then left alone */
+    bool foreign; /* that record was one of gust_archive_same */
+    bool good;    /* false after a record that was not the expected one; the rest is then left alone */
     char wrong[GUST_ARCHIVE_NAME]; /* name of that record */
 } gust_archive;
 
@@ -41,8 +42,11 @@ void gust_archive_small_index(gust_archive *archive, const char *name, int32_t *
                               int32_t high);
 void gust_archive_flag(gust_archive *archive, const char *name, bool *flag);
 
-/* A number that must be the same when loading; if it is not, the archive is no longer good. */
-void gust_archive_expect(gust_archive *archive, const char *name, double number);
+void gust_archive_ints(gust_archive *archive, const char *name, int *data, int64_t count);
+
+/* Numbers that must be the same when loading: if one is not, the state belongs to something else. */
+void gust_archive_same(gust_archive *archive, const char *name, double number);
+void gust_archive_same_identity(gust_archive *archive, const char *name, uint64_t identity);
 
 /* What loaded numbers must obey; if not, the archive is no longer good. */
 void gust_archive_require(gust_archive *archive, const char *name, bool condition);

@@ -218,6 +218,29 @@ void gust_assembly_when(gust_assembly *assembly, const gust_block *block, int32_
                        y_after + type->first_unknown[instance], discrete_after + first);
 }
 
+void gust_assembly_archive(gust_assembly *assembly, gust_archive *archive)
+{
+    const gust_model *model = assembly->model;
+    gust_archive_doubles(archive, "inputs", assembly->inputs, model->n_inputs);
+    gust_archive_doubles(archive, "discrete", assembly->discrete, assembly->n_discrete);
+    for (int32_t b = 0; b < model->n_types; ++b) {
+        const gust_block *block = &assembly->blocks[b];
+        gust_archive_doubles(archive, "parameters", block->parameters,
+                             (int64_t)block->type->n_instances * block->type->kernel->n_parameters);
+    }
+}
+
+void gust_assembly_prepare(gust_assembly *assembly)
+{
+    for (int32_t b = 0; b < assembly->model->n_types; ++b) {
+        const gust_block *block = &assembly->blocks[b];
+        const gust_kernel *kernel = block->type->kernel;
+        for (int32_t i = 0; i < block->type->n_instances; ++i) {
+            kernel->prepare(block->point[i].p, block->constants + (int64_t)i * kernel->n_constants);
+        }
+    }
+}
+
 void gust_assembly_set_parameter(gust_assembly *assembly, int32_t type, int32_t instance, int32_t parameter,
                                  double value)
 {

@@ -9,6 +9,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "archive.h"
 #include "model.h"
 
 /* All instances of one type. */
@@ -77,6 +78,11 @@ void gust_assembly_roots(gust_assembly *assembly, const gust_block *block, int32
  * changes into y_after and the discrete values into discrete_after (all unknowns, all discrete values). */
 void gust_assembly_when(gust_assembly *assembly, const gust_block *block, int32_t instance, int32_t clause,
                         double t, const double *y, const double *yp, double *y_after, double *discrete_after);
+
+/* For checkpoints: inputs, parameters and discrete values of now. After loading, gust_assembly_prepare works
+ * out what follows from the parameters. */
+void gust_assembly_archive(gust_assembly *assembly, gust_archive *archive);
+void gust_assembly_prepare(gust_assembly *assembly);
 
 /* Sets one parameter and what follows from it. */
 void gust_assembly_set_parameter(gust_assembly *assembly, int32_t type, int32_t instance, int32_t parameter,

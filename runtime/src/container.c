@@ -43,6 +43,11 @@ static uint64_t element_size(uint32_t dtype)
     }
 }
 
+size_t gust_dtype_size(gust_dtype dtype)
+{
+    return (size_t)element_size(dtype);
+}
+
 static int by_name(const void *left, const void *right)
 {
     return strcmp(((const gust_section *)left)->name, ((const gust_section *)right)->name);

@@ -22,6 +22,9 @@ typedef struct gust_container {
     uint32_t n_sections;
 } gust_container;
 
+/* Bytes of one element. */
+size_t gust_dtype_size(gust_dtype dtype);
+
 /* Reads the directory of bytes[size], which must start on a 64-byte boundary and outlive the container.
  * false and a message if anything in it cannot be. Free with gust_container_close. */
 bool gust_container_open(gust_container *container, const uint8_t *bytes, size_t size, char *message,

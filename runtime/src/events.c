@@ -330,3 +330,11 @@ gust_status gust_events_handle(gust_events *events, gust_system *system, gust_sa
     }
     return GUST_OK;
 }
+
+void gust_events_archive(gust_events *events, gust_archive *archive)
+{
+    gust_archive_ints(archive, "events.found", events->found, events->n_watched);
+    gust_archive_index(archive, "events.n_events", &events->n_events, 0, INT64_MAX / 2);
+    gust_archive_doubles(archive, "events.last_event", &events->last_event, 1);
+    gust_archive_index(archive, "events.in_succession", &events->in_succession, 0, INT64_MAX / 2);
+}

@@ -72,6 +72,9 @@ gust_status gust_events_handle(gust_events *events, gust_system *system, gust_sa
                                gust_initial *initial, const gust_options *options, double t, bool found,
                                double *y, double *yp, bool *changed, char *message, size_t size);
 
+/* For checkpoints; the conditions themselves are settled again after loading. */
+void gust_events_archive(gust_events *events, gust_archive *archive);
+
 /* Name of a watched root function, for messages. */
 void gust_events_name(const gust_watched *watched, char *text, size_t size);
 

@@ -16,8 +16,8 @@ gust_status gust_initial_create(gust_initial *initial, gust_system *system, cons
     const size_t n = (size_t)gust_lane_padded(model->n_unknowns);
     const size_t n_nonzeros = (size_t)model->n_nonzeros;
     *initial = (gust_initial){.system = system, .options = options};
-    gust_factors_start(&initial->factors, model->n_unknowns, model->column_start, model->row_index, symbolic,
-                       common);
+    const bool started = gust_factors_start(&initial->factors, model->n_unknowns, model->column_start,
+                                            model->row_index, symbolic, common);
     initial->factors.growth_check = 1;
     initial->residual = gust_allocate(n, sizeof(double));
     initial->values = gust_allocate(n_nonzeros, sizeof(double));
@@ -27,9 +27,10 @@ gust_status gust_initial_create(gust_initial *initial, gust_system *system, cons
     initial->weight = gust_allocate(n, sizeof(double));
     initial->trial_y = gust_allocate(n, sizeof(double));
     initial->trial_yp = gust_allocate(n, sizeof(double));
-    const bool complete = initial->residual != NULL && initial->values != NULL && initial->values_1 != NULL &&
-                          initial->correction != NULL && initial->next_correction != NULL &&
-                          initial->weight != NULL && initial->trial_y != NULL && initial->trial_yp != NULL;
+    const bool complete = started && initial->residual != NULL && initial->values != NULL &&
+                          initial->values_1 != NULL && initial->correction != NULL &&
+                          initial->next_correction != NULL && initial->weight != NULL &&
+                          initial->trial_y != NULL && initial->trial_yp != NULL;
     return complete ? GUST_OK : GUST_OUT_OF_MEMORY;
 }
 

@@ -22,7 +22,7 @@ static double *writable_values(const double *array)
     return same;
 }
 
-void gust_factors_start(gust_factors *factors, int32_t n, const int32_t *column_start, const int32_t *row_index,
+bool gust_factors_start(gust_factors *factors, int32_t n, const int32_t *column_start, const int32_t *row_index,
                         klu_symbolic *symbolic, const klu_common *common)
 {
     *factors = (gust_factors){.n = n,
@@ -32,11 +32,15 @@ void gust_factors_start(gust_factors *factors, int32_t n, const int32_t *column_
                               .common = *common,
                               .growth_limit = 1e-8,
                               .singular_column = -1};
+    factors->chosen_for = gust_allocate((size_t)column_start[n], sizeof *factors->chosen_for);
+    return factors->chosen_for != NULL;
 }
 
 void gust_factors_free(gust_factors *factors)
 {
     gust_lu_free(&factors->lu);
+    gust_release(factors->chosen_for);
+    factors->chosen_for = NULL;
     factors->planned = false;
 }
 
@@ -49,6 +53,9 @@ static bool factor(gust_factors *factors, const double *values)
     factors->fresh_pivots = false;
     factors->planned = false;
     factors->singular_column = -1;
+    if (values != factors->chosen_for) {
+        memcpy(factors->chosen_for, values, (size_t)factors->column_start[factors->n] * sizeof *values);
+    }
     klu_numeric *numeric = klu_factor(factors->column_start, factors->row_index, writable_values(values),
                                       factors->symbolic, common);
     const bool regular = numeric != NULL && common->status == KLU_OK;
@@ -96,6 +103,25 @@ bool gust_factors_set(gust_factors *factors, const double *values)
 void gust_factors_solve(gust_factors *factors, const double *right, double *solution)
 {
     gust_lu_solve(&factors->lu, right, solution);
+}
+
+void gust_factors_archive(gust_factors *factors, gust_archive *archive)
+{
+    gust_archive_flag(archive, "factors.planned", &factors->planned);
+    gust_archive_doubles(archive, "factors.chosen_for", factors->chosen_for, factors->column_start[factors->n]);
+}
+
+bool gust_factors_choose_again(gust_factors *factors)
+{
+    return !factors->planned || factor(factors, factors->chosen_for);
+}
+
+void gust_factors_archive_counters(gust_factors *factors, gust_archive *archive)
+{
+    gust_archive_flag(archive, "factors.fresh_pivots", &factors->fresh_pivots);
+    gust_archive_longs(archive, "factors.since_check", &factors->since_check, 1);
+    gust_archive_longs(archive, "factors.first", &factors->factorisations, 1);
+    gust_archive_longs(archive, "factors.again", &factors->refactorisations, 1);
 }
 
 /* -- SUNMatrix ------------------------------------------------------------------------------------------ */

@@ -11,6 +11,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#include "archive.h"
 #include "container.h"
 #include "gustform/gust_model.h"
 #include "kernel_library.h"
@@ -755,6 +756,34 @@ static bool read_model(loader *load)
     return find_unowned(load) && read_schedule(load) && read_channels(load);
 }
 
+/* Hash of all sections, for telling models apart. What may differ between two builds of the same model is left
+ * out: metadata, and the folders of kernels (whose names say what is in them) and series. */
+static uint64_t identity_of(const gust_container *container)
+{
+    uint64_t hash = GUST_HASH_START;
+    for (uint32_t k = 0; k < container->n_sections; ++k) {
+        const gust_section *found = &container->sections[k];
+        const uint8_t *data = found->data;
+        size_t bytes = (size_t)found->count * gust_dtype_size(found->dtype);
+        const char *dot = strrchr(found->name, '.');
+        if (strcmp(found->name, "metadata") == 0) {
+            continue;
+        }
+        if (dot != NULL && (strcmp(dot, ".kernel") == 0 || strcmp(dot, ".path") == 0)) {
+            for (size_t i = bytes; i > 0; --i) {
+                if (data[i - 1] == '/') {
+                    data += i;
+                    bytes -= i;
+                    break;
+                }
+            }
+        }
+        hash = gust_hash(hash, found->name, strlen(found->name) + 1);
+        hash = gust_hash(hash, data, bytes);
+    }
+    return hash;
+}
+
 /* Takes over `data` (from gust_allocate), whatever the result. */
 static gust_status build(uint8_t *data, size_t n_bytes, const char *folder, gust_model **model, char *message,
                          size_t size)
@@ -770,6 +799,7 @@ static gust_status build(uint8_t *data, size_t n_bytes, const char *folder, gust
     if (!gust_container_open(&load.container, data, n_bytes, message, size)) {
         load.status = GUST_BAD_CONTAINER;
     } else if (read_model(&load)) {
+        load.model->identity = identity_of(&load.container);
         *model = load.model;
     }
     gust_container_close(&load.container);

@@ -9,6 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
+#include <unistd.h>
 
 #include "gustform/gust_sim.h"
 
@@ -20,6 +21,9 @@ typedef struct arguments {
     double start;
     double until;
     double every;
+    const char *checkpoint; /* file to write, NULL: none */
+    double checkpoint_every;
+    const char *resume; /* checkpoint to go on from, NULL: none */
     bool has_until;
     bool quiet;
 } arguments;
@@ -40,15 +44,22 @@ static void on_interrupt(int number)
 
 static void print_usage(FILE *to)
 {
-    fputs("usage: gust-run MODEL.gust --until SECONDS [--every SECONDS] [--start SECONDS] [--out FILE.csv]\n"
-          "                [--quiet] [--OPTION VALUE ...]\n"
-          "Runs a built model and writes its channels as CSV, to standard output unless --out names a file.\n"
-          "  --until   simulated time at which to stop, s\n"
-          "  --every   interval of result rows, s (default: a thousandth of the run)\n"
-          "  --start   simulated time at which to start, s (default 0)\n"
-          "  --quiet   no statistics on standard error\n"
-          "Options of the integrator:\n",
-          to);
+    fputs(
+        "usage: gust-run MODEL.gust --until SECONDS [--every SECONDS] [--start SECONDS] [--out FILE.csv]\n"
+        "                [--checkpoint FILE --checkpoint-every SECONDS] [--resume FILE]\n"
+        "                [--quiet] [--OPTION VALUE ...]\n"
+        "Runs a built model and writes its channels as CSV, to standard output unless --out names a file.\n"
+        "  --until   simulated time at which to stop, s\n"
+        "  --every   interval of result rows, s (default: a thousandth of the run)\n"
+        "  --start   simulated time at which to start, s (default 0)\n"
+        "  --quiet   no statistics on standard error\n"
+        "  --checkpoint FILE --checkpoint-every SECONDS\n"
+        "            keep the state in FILE, replaced whenever so much simulated time has passed\n"
+        "  --resume FILE\n"
+        "            go on from such a file after a crash, with all other arguments as they were: rows in --out\n"
+        "            that are newer are cut off, and the result is that of an uninterrupted run, bit for bit\n"
+        "Options of the integrator:\n",
+        to);
     for (int i = 0; gust_option_list(i) != NULL; ++i) {
         const gust_option_info *option = gust_option_list(i);
         fprintf(to, "  --%-22s %s (default %g)\n", option->name, option->sentence, option->initial);
@@ -67,6 +78,15 @@ static bool read_number(const char *name, const char *text, double *value)
         return false;
     }
     return true;
+}
+
+static bool read_name(const char *name, const char *text, const char **value)
+{
+    *value = text;
+    if (text == NULL) {
+        fprintf(stderr, "gust-run: %s needs a file name\n", name);
+    }
+    return text != NULL;
 }
 
 /* The arguments that are not options of the integrator; those follow in apply_options. */
@@ -101,12 +121,18 @@ static bool read_arguments(int argc, char **argv, arguments *given)
             }
         } else if (strcmp(name, "--start") == 0) {
             good = read_number(name, value, &given->start);
-        } else if (strcmp(name, "--out") == 0) {
-            given->out = value;
-            good = value != NULL;
-            if (!good) {
-                fputs("gust-run: --out needs a file name\n", stderr);
+        } else if (strcmp(name, "--checkpoint-every") == 0) {
+            good = read_number(name, value, &given->checkpoint_every);
+            if (good && !(given->checkpoint_every > 0.0)) {
+                fprintf(stderr, "gust-run: --checkpoint-every must be greater than 0 s; got %s\n", value);
+                good = false;
             }
+        } else if (strcmp(name, "--out") == 0) {
+            good = read_name(name, value, &given->out);
+        } else if (strcmp(name, "--checkpoint") == 0) {
+            good = read_name(name, value, &given->checkpoint);
+        } else if (strcmp(name, "--resume") == 0) {
+            good = read_name(name, value, &given->resume);
         } else {
             good = read_number(name, value, &ignored);
         }
@@ -118,6 +144,10 @@ static bool read_arguments(int argc, char **argv, arguments *given)
         fputs("gust-run: a model file and --until are needed\n", stderr);
         return false;
     }
+    if ((given->checkpoint != NULL) != (given->checkpoint_every > 0.0)) {
+        fputs("gust-run: --checkpoint and --checkpoint-every need each other\n", stderr);
+        return false;
+    }
     if (!(given->until > given->start)) {
         fprintf(stderr, "gust-run: --until (%g s) must be after --start (%g s)\n", given->until, given->start);
         return false;
@@ -127,7 +157,8 @@ static bool read_arguments(int argc, char **argv, arguments *given)
 
 static bool is_own(const char *name)
 {
-    static const char *const OWN[] = {"--until", "--every", "--start", "--out"};
+    static const char *const OWN[] = {
+        "--until", "--every", "--start", "--out", "--checkpoint", "--checkpoint-every", "--resume"};
     for (size_t k = 0; k < sizeof OWN / sizeof OWN[0]; ++k) {
         if (strcmp(name, OWN[k]) == 0) {
             return true;
@@ -200,7 +231,7 @@ static double seconds_between(const struct timespec *from, const struct timespec
     return (double)(to->tv_sec - from->tv_sec) + 1e-9 * (double)(to->tv_nsec - from->tv_nsec);
 }
 
-static int run(const arguments *given, const gust_model *model, gust_sim *sim, csv *to)
+static void write_header(const gust_model *model, csv *to)
 {
     fputs("\"time [s]\"", to->file);
     for (int32_t k = 0; k < to->n_channels; ++k) {
@@ -208,6 +239,74 @@ static int run(const arguments *given, const gust_model *model, gust_sim *sim, c
         write_quoted(to->file, gust_model_channel_name(model, k), gust_model_channel_unit(model, k));
     }
     fputc('\n', to->file);
+}
+
+/* Cuts the file behind its header and so many rows, where the run goes on. */
+static bool cut_behind(FILE *file, int64_t rows)
+{
+    int64_t lines = 0;
+    for (int c = 0; lines <= rows && c != EOF;) {
+        c = fgetc(file);
+        lines += c == '\n' ? 1 : 0;
+    }
+    if (lines <= rows) {
+        fprintf(stderr, "gust-run: the file of rows ends after %lld lines, before the checkpoint: start anew\n",
+                (long long)lines);
+        return false;
+    }
+    const long end = ftell(file);
+    if (end < 0 || fflush(file) != 0 || ftruncate(fileno(file), end) != 0 || fseek(file, end, SEEK_SET) != 0) {
+        fprintf(stderr, "gust-run: the file of rows cannot be cut: %s\n", strerror(errno));
+        return false;
+    }
+    return true;
+}
+
+/* To the state of the checkpoint, and the file of rows to where it was then. */
+static bool resume(const arguments *given, gust_sim *sim, csv *to)
+{
+    const gust_status status = gust_sim_restore(sim, given->resume);
+    if (status != GUST_OK) {
+        fprintf(stderr, "gust-run: %s: %s\n", gust_status_name(status), gust_sim_message(sim));
+        return false;
+    }
+    gust_statistics statistics;
+    gust_sim_statistics(sim, &statistics);
+    return given->out == NULL || cut_behind(to->file, statistics.rows);
+}
+
+/* Advances to the end, from checkpoint to checkpoint. What has been written reaches the disk before the
+ * checkpoint that follows it. */
+static gust_status advance(const arguments *given, gust_sim *sim, const csv *to)
+{
+    if (given->checkpoint == NULL) {
+        return gust_sim_advance(sim, given->until, NULL);
+    }
+    const double every = given->checkpoint_every;
+    double number = floor((gust_sim_time(sim) - given->start) / every + 0.5);
+    for (;;) {
+        number += 1.0;
+        const double next = given->start + number * every;
+        gust_status status = gust_sim_advance(sim, fmin(next, given->until), NULL);
+        if (status != GUST_OK || next >= given->until) {
+            return status;
+        }
+        /* Pipes and terminals cannot be synchronised, and need not be. */
+        if (fflush(to->file) != 0 || (fsync(fileno(to->file)) != 0 && errno != EINVAL && errno != EROFS)) {
+            return GUST_SINK_FAILED;
+        }
+        status = gust_sim_checkpoint(sim, given->checkpoint);
+        if (status != GUST_OK) {
+            return status;
+        }
+    }
+}
+
+static int run(const arguments *given, const gust_model *model, gust_sim *sim, csv *to)
+{
+    if (given->resume == NULL) {
+        write_header(model, to);
+    }
     const double every = given->every > 0.0 ? given->every : (given->until - given->start) / 1000.0;
     gust_status status = gust_sim_set_sink(sim, every, BLOCK_ROWS, write_rows, to);
     struct timespec begin;
@@ -216,13 +315,16 @@ static int run(const arguments *given, const gust_model *model, gust_sim *sim, c
     if (status == GUST_OK) {
         status = gust_sim_initialise(sim, given->start);
     }
+    if (status == GUST_OK && given->resume != NULL && !resume(given, sim, to)) {
+        return EXIT_RUN;
+    }
     running = sim;
     struct sigaction action = {.sa_handler = on_interrupt};
     sigemptyset(&action.sa_mask);
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
     if (status == GUST_OK) {
-        status = gust_sim_advance(sim, given->until, NULL);
+        status = advance(given, sim, to);
     }
     clock_gettime(CLOCK_MONOTONIC, &end);
     if (!given->quiet) {
@@ -231,7 +333,9 @@ static int run(const arguments *given, const gust_model *model, gust_sim *sim, c
     if (status == GUST_OK) {
         return EXIT_SUCCESS;
     }
-    fprintf(stderr, "gust-run: %s: %s\n", gust_status_name(status), gust_sim_message(sim));
+    const char *message = gust_sim_message(sim);
+    fprintf(stderr, "gust-run: %s: %s\n", gust_status_name(status),
+            message[0] != '\0' ? message : gust_status_text(status));
     return status == GUST_STOP_REQUESTED ? EXIT_INTERRUPTED : EXIT_RUN;
 }
 
@@ -260,7 +364,8 @@ int main(int argc, char **argv)
     } else if (!apply_options(argc, argv, sim)) {
         code = EXIT_USAGE;
     } else {
-        to.file = given.out != NULL ? fopen(given.out, "w") : stdout;
+        const char *mode = given.resume != NULL ? "r+" : "w";
+        to.file = given.out != NULL ? fopen(given.out, mode) : stdout;
         if (to.file == NULL) {
             fprintf(stderr, "gust-run: %s cannot be written: %s\n", given.out, strerror(errno));
         } else {

@@ -81,7 +81,8 @@ typedef struct gust_channel {
 } gust_channel;
 
 struct gust_model {
-    uint8_t *bytes; /* the whole container */
+    uint8_t *bytes;    /* the whole container */
+    uint64_t identity; /* hash of everything that a run depends on */
     int32_t n_unknowns;
     int32_t n_nonzeros;
     int32_t n_types;

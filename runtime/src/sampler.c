@@ -130,3 +130,16 @@ bool gust_sampler_change(gust_sampler *sampler, gust_system *system, double t, b
     *changed = *changed || any;
     return !any || renew_periods(sampler, t, bad);
 }
+
+void gust_sampler_archive(gust_sampler *sampler, gust_archive *archive)
+{
+    gust_archive_small_index(archive, "sampler.next_change", &sampler->next_change, 0,
+                             sampler->model->n_schedule);
+    for (int32_t k = 0; k < sampler->n_sampled; ++k) {
+        gust_sampled *sampled = &sampler->sampled[k];
+        gust_archive_doubles(archive, "sampler.period", &sampled->period, 1);
+        gust_archive_doubles(archive, "sampler.start", &sampled->start, 1);
+        gust_archive_index(archive, "sampler.count", &sampled->count, 0, INT64_MAX / 2);
+        gust_archive_doubles(archive, "sampler.next", &sampled->next, 1);
+    }
+}

@@ -35,6 +35,9 @@ void gust_sampler_free(gust_sampler *sampler);
 /* First samples at t0; changes up to t0 are made. false: a period is not positive, see *bad. */
 bool gust_sampler_start(gust_sampler *sampler, gust_system *system, double t0, const gust_sampled **bad);
 
+/* For checkpoints. */
+void gust_sampler_archive(gust_sampler *sampler, gust_archive *archive);
+
 /* Next time at which something is due, s. */
 double gust_sampler_next(const gust_sampler *sampler);
 

@@ -609,6 +609,42 @@ double gust_series_next(const gust_series_set *set)
     return next;
 }
 
+/* -- checkpoints ---------------------------------------------------------------------------------------- */
+
+void gust_series_archive(gust_series_set *set, gust_archive *archive)
+{
+    for (int32_t k = 0; k < set->n_series; ++k) {
+        gust_series *series = &set->series[k];
+        const bool in_model = series->what->source == GUST_SERIES_INLINE;
+        series->saved_first = archive->mode == GUST_ARCHIVE_LOAD ? series->saved_first : series->first;
+        /* The bound leaves room to multiply and add without overflow. */
+        gust_archive_index(archive, "series.first", &series->saved_first, 0, in_model ? 0 : INT64_MAX / 64);
+        gust_archive_index(archive, "series.n_total", &series->n_total, in_model ? series->n_total : 1,
+                           INT64_MAX);
+        gust_archive_doubles(archive, "series.end", &series->end, 1);
+        gust_archive_doubles(archive, "series.shift", &series->shift, 1);
+        gust_archive_doubles(archive, "series.next", &series->next, 1);
+    }
+}
+
+bool gust_series_reopen(gust_series_set *set)
+{
+    for (int32_t k = 0; k < set->n_series; ++k) {
+        gust_series *series = &set->series[k];
+        const int64_t n_total = series->n_total;
+        const double end = series->end;
+        if (series->what->source != GUST_SERIES_INLINE && !load_window(set, series, series->saved_first)) {
+            return false;
+        }
+        series->n_total = n_total;
+        series->end = end;
+        series->cubic_of = -1;
+    }
+    find_end(set);
+    set->evaluated_at = NAN;
+    return true;
+}
+
 /* -- looking ahead -------------------------------------------------------------------------------------- */
 
 /* The window holds the samples from that at or before t on; moved forward if it ends before `until` and there

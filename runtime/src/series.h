@@ -20,6 +20,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "archive.h"
 #include "gustform/gust_sim.h"
 #include "model.h"
 
@@ -37,13 +38,14 @@ typedef struct gust_series {
     int64_t cursor;  /* sample in the window that the last look-up used */
     int64_t n_total; /* how many samples there are; INT64_MAX while unknown */
     double step_inverse;
-    double latest;    /* value at the time last evaluated, unless held */
-    double size;      /* largest |value| in the window */
-    int64_t cubic_of; /* number of the sample whose interval `cubic` holds for, -1 for none */
-    double cubic[4];  /* value = sum of cubic[i] (t - time of the sample)^i */
-    double end;       /* last time with data, s */
-    double shift;     /* what has been repeated so far, s */
-    double next;      /* next time at which gust_series_update has something to do, s */
+    double latest;       /* value at the time last evaluated, unless held */
+    double size;         /* largest |value| in the window */
+    int64_t cubic_of;    /* number of the sample whose interval `cubic` holds for, -1 for none */
+    double cubic[4];     /* value = sum of cubic[i] (t - time of the sample)^i */
+    double end;          /* last time with data, s */
+    double shift;        /* what has been repeated so far, s */
+    double next;         /* next time at which gust_series_update has something to do, s */
+    int64_t saved_first; /* from a checkpoint, for gust_series_reopen */
 } gust_series;
 
 typedef struct gust_series_set {
@@ -73,6 +75,11 @@ bool gust_series_update(gust_series_set *set, double t, double *inputs, bool *ch
 
 /* Next time at which gust_series_update must be called, s. */
 double gust_series_next(const gust_series_set *set);
+
+/* For checkpoints: where in the data each series is. After loading, gust_series_reopen reads the same windows
+ * again; false: see set->failure. */
+void gust_series_archive(gust_series_set *set, gust_archive *archive);
+bool gust_series_reopen(gust_series_set *set);
 
 /* Latest time to which a step from t may go, if it is meant to be `step` long: as far as the samples of every
  * interpolated series stay within `tolerance` (of the series' size) of the straight line between its ends,

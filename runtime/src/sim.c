@@ -57,6 +57,7 @@ void gust_sim_destroy(gust_sim **sim)
     }
     gust_sim *old = *sim;
     free_solver(old);
+    gust_checkpoint_free(old);
     gust_sink_free(&old->sink);
     gust_sink_free(&old->probe);
     gust_sampler_free(&old->sampler);
@@ -209,6 +210,9 @@ static gust_status prepare(gust_sim *sim, double t0)
     }
     if (status == GUST_OK && sim->probe.stats != NULL) {
         status = gust_sink_open(&sim->probe, fmax(sim->probe.start, t0));
+    }
+    if (status == GUST_OK) {
+        status = gust_checkpoint_create(sim);
     }
     if (status == GUST_OUT_OF_MEMORY) {
         gust_text(message, size, "out of memory for the simulation");

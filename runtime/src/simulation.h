@@ -39,8 +39,15 @@ struct gust_sim {
     _Atomic double time; /* the same, for other threads */
     int64_t cut_steps;   /* made shorter because a series turns within them */
     atomic_int stop;     /* set by gust_sim_request_stop */
+    uint8_t *checkpoint; /* [checkpoint_room] bytes of the last one */
+    size_t checkpoint_room;
+    size_t checkpoint_size; /* 0: none yet */
     char message[4096];
 };
+
+/* Allocates the room for checkpoints; frees it. */
+gust_status gust_checkpoint_create(gust_sim *sim);
+void gust_checkpoint_free(gust_sim *sim);
 
 /* The next time at which a sample, a scheduled change or a step of a series is due, s. */
 double gust_next_event(const gust_sim *sim);

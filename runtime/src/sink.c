@@ -165,3 +165,22 @@ gust_status gust_sink_flush(gust_sink *sink)
     }
     return answer > 0 ? GUST_SINK_STOPPED : GUST_OK;
 }
+
+void gust_sink_archive_kind(gust_sink *sink, gust_archive *archive)
+{
+    const bool used = sink->receive != NULL || sink->stats != NULL;
+    gust_archive_same(archive, "rows.interval", used ? sink->interval : 0.0);
+    gust_archive_same_identity(archive, "statistics", sink->stats != NULL ? sink->stats->identity : 0);
+}
+
+void gust_sink_archive(gust_sink *sink, gust_archive *archive)
+{
+    gust_archive_doubles(archive, "rows.start", &sink->start, 1);
+    gust_archive_index(archive, "rows.next", &sink->next_row, 0, INT64_MAX / 2);
+    if (archive->mode == GUST_ARCHIVE_LOAD && isfinite(sink->next_time)) {
+        sink->next_time = sink->start + (double)sink->next_row * sink->interval;
+    }
+    if (sink->stats != NULL) {
+        gust_stats_archive(sink->stats, archive);
+    }
+}

@@ -53,6 +53,11 @@ bool gust_sink_evaluate(gust_sink *sink, gust_system *system, double t, const do
 /* Adds the row that is due, for its time sink->next_time; hands the block over when it is full. */
 gust_status gust_sink_add(gust_sink *sink, gust_system *system, const double *y, const double *yp);
 
+/* For checkpoints, after a flush: what kind of rows, which must be the same when loading; and the place in the
+ * grid. */
+void gust_sink_archive_kind(gust_sink *sink, gust_archive *archive);
+void gust_sink_archive(gust_sink *sink, gust_archive *archive);
+
 /* Hands over what has been collected. */
 gust_status gust_sink_flush(gust_sink *sink);
 

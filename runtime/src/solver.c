@@ -153,8 +153,10 @@ gust_status gust_solver_create(gust_solver *solver, gust_system *system, gust_ev
         return no_memory(message, size);
     }
     klu_defaults(&solver->common);
-    gust_factors_start(&solver->factors, model->n_unknowns, model->column_start, model->row_index, NULL,
-                       &solver->common);
+    if (!gust_factors_start(&solver->factors, model->n_unknowns, model->column_start, model->row_index, NULL,
+                            &solver->common)) {
+        return no_memory(message, size);
+    }
     solver->symbolic = klu_analyze(model->n_unknowns, solver->factors.column_start, solver->factors.row_index,
                                    &solver->common);
     if (solver->symbolic == NULL) {
@@ -295,7 +297,7 @@ gust_status gust_solver_start(gust_solver *solver, double t, double first_step, 
     }
     solver->t = t;
     solver->first_step = first_step;
-    solver->stop = INFINITY;
+    solver->stop = NAN;
     solver->stalled_steps = 0;
     return choose_pivots(solver, t, first_step, message, size);
 }
@@ -325,6 +327,10 @@ gust_status gust_solver_restart(gust_solver *solver, double t, double first_step
                  &solver->nonlinear_failures);
     solver->failures_seen = 0;
     solver->doubtful_step = -1;
+    /* Nothing of the past may show: a run that goes on from a checkpoint has none. */
+    solver->newton.contraction = 0.0;
+    solver->newton.setup_cj = 0.0;
+    solver->newton.last_cj = 0.0;
     ++solver->restarts;
     if (IDAReInit(solver->ida, t, solver->y, solver->yp) != IDA_SUCCESS ||
         IDASetInitStep(solver->ida, first_step) != IDA_SUCCESS) {
@@ -332,7 +338,7 @@ gust_status gust_solver_restart(gust_solver *solver, double t, double first_step
     }
     solver->t = t;
     solver->first_step = first_step;
-    solver->stop = INFINITY;
+    solver->stop = NAN;
     solver->stalled_steps = 0;
     return GUST_OK;
 }
@@ -469,7 +475,7 @@ gust_step gust_solver_step(gust_solver *solver, double stop, gust_status *status
     case IDA_SUCCESS:
         return GUST_STEP_TAKEN;
     case IDA_TSTOP_RETURN:
-        solver->stop = INFINITY; /* the integrator has forgotten it too */
+        solver->stop = NAN; /* the integrator has forgotten it */
         return GUST_STEP_AT_STOP;
     case IDA_ROOT_RETURN:
         IDAGetRootInfo(solver->ida, solver->events->found);
@@ -484,6 +490,26 @@ bool gust_solver_dense(gust_solver *solver, double t, bool derivatives)
 {
     return IDAGetDky(solver->ida, t, 0, solver->dense_y) == IDA_SUCCESS &&
            (!derivatives || IDAGetDky(solver->ida, t, 1, solver->dense_yp) == IDA_SUCCESS);
+}
+
+void gust_solver_archive(gust_solver *solver, gust_archive *archive)
+{
+    const int32_t n = solver->system->model->n_unknowns;
+    gust_archive_doubles(archive, "solver.t", &solver->t, 1);
+    gust_archive_doubles(archive, "solver.first_step", &solver->first_step, 1);
+    gust_archive_doubles(archive, "solver.y", gust_vector_data(solver->y), n);
+    gust_archive_doubles(archive, "solver.yp", gust_vector_data(solver->yp), n);
+    gust_factors_archive(&solver->factors, archive);
+}
+
+void gust_solver_archive_counters(gust_solver *solver, gust_archive *archive)
+{
+    int64_t *const counters[] = {&solver->steps, &solver->error_test_failures, &solver->nonlinear_iterations,
+                                 &solver->nonlinear_failures, &solver->restarts};
+    for (size_t k = 0; k < sizeof counters / sizeof counters[0]; ++k) {
+        gust_archive_longs(archive, "solver.counter", counters[k], 1);
+    }
+    gust_factors_archive_counters(&solver->factors, archive);
 }
 
 void gust_solver_statistics(const gust_solver *solver, gust_statistics *statistics)

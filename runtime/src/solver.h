@@ -36,7 +36,7 @@ typedef struct gust_solver {
     gust_factors factors;
     double t;          /* of y and yp, s */
     double first_step; /* after the last (re)start, s */
-    double stop;       /* time the integrator may not step over, s */
+    double stop;       /* time the integrator may not step over, s; NaN: not told yet */
     int stalled_steps; /* in succession, that did not move the time */
     /* the last point at which the residual was evaluated, for diagnosis */
     double last_t;
@@ -77,6 +77,10 @@ gust_step gust_solver_step(gust_solver *solver, double stop, gust_status *status
 
 /* y (and y' if wanted) at a time within the last step, into dense_y and dense_yp. */
 bool gust_solver_dense(gust_solver *solver, double t, bool derivatives);
+
+/* For checkpoints, right after a restart: everything gust_solver_restart needs to do that again. */
+void gust_solver_archive(gust_solver *solver, gust_archive *archive);
+void gust_solver_archive_counters(gust_solver *solver, gust_archive *archive);
 
 /* Counters since the first start. */
 void gust_solver_statistics(const gust_solver *solver, gust_statistics *statistics);

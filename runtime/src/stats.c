@@ -435,11 +435,7 @@ gust_status gust_stats_cycles(gust_stats *stats, int32_t channel, double *damage
 
 void gust_stats_archive(gust_stats *stats, gust_archive *archive)
 {
-    int64_t identity = 0;
-    memcpy(&identity, &stats->identity, sizeof identity);
-    const int64_t own = identity;
-    gust_archive_longs(archive, "stats.identity", &identity, 1);
-    gust_archive_require(archive, "stats.identity", identity == own);
+    gust_archive_same_identity(archive, "stats.identity", stats->identity);
     gust_archive_longs(archive, "stats.rows", &stats->rows, 1);
     gust_archive_small_index(archive, "stats.filled", &stats->filled, 0, GUST_STATS_BLOCK - 1);
     gust_archive_doubles(archive, "stats.time", stats->time, GUST_STATS_BLOCK);

@@ -1,6 +1,7 @@
 /* After initialise nothing allocates: the linker sends every allocation of this program through here, those of
  * SUNDIALS and KLU included. */
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -113,6 +114,7 @@ static void run(void **state)
         advance(sim, (double)k);
         unknowns(sim, y);
         gust_sim_channels(sim, row);
+        assert_int_equal(gust_sim_checkpoint(sim, GUSTFORM_TEST_KERNELS "/allocation.gustck"), GUST_OK);
     }
     gust_statistics statistics;
     gust_sim_statistics(sim, &statistics);
@@ -125,6 +127,7 @@ static void run(void **state)
     assert_int_equal(allocations, before);
     assert_int_equal(moments.count, 2001);
     assert_true(statistics.restarts > 220);
+    remove(GUSTFORM_TEST_KERNELS "/allocation.gustck");
     gust_sim_destroy(&sim);
     gust_stats_destroy(&stats);
     gust_model_destroy(&model);

@@ -18,6 +18,51 @@
 static const char *const MODEL = GUSTFORM_TEST_KERNELS "/run.gust";
 static const char *const CSV = GUSTFORM_TEST_KERNELS "/run.csv";
 static const char *const WORDS = GUSTFORM_TEST_KERNELS "/run.txt";
+static const char *const BUSY = GUSTFORM_TEST_KERNELS "/busy.gust";
+static const char *const WHOLE = GUSTFORM_TEST_KERNELS "/whole.csv";
+static const char *const SAVED = GUSTFORM_TEST_KERNELS "/run.gustck";
+
+static int write_bytes(model_writer *writer, const char *path)
+{
+    size_t size = 0;
+    unsigned char *bytes = writer_bytes(writer, &size);
+    writer_clear(writer);
+    FILE *file = fopen(path, "wb");
+    const int failed = file == NULL || fwrite(bytes, 1, size, file) != size || fclose(file) != 0;
+    free(bytes);
+    return failed;
+}
+
+/* A circuit on an endless gusty PCHIP series and a bouncing ball: never at rest. */
+static int write_busy_model(void)
+{
+    static system_builder builder;
+    static double value[101];
+    memset(&builder, 0, sizeof builder);
+    builder.n_types = 2;
+    builder.types[0] = (built_type){.kernel = "rc",
+                                    .n_instances = 1,
+                                    .instances = {{.name = "circuit", .parameters = {2.0, 0.25}}},
+                                    .differential = {1, 0}};
+    builder.types[1] =
+        (built_type){.kernel = "ball",
+                     .n_instances = 1,
+                     .instances = {{.name = "ball", .parameters = {9.81, 1.0}, .start = {1.0, 0.0}}},
+                     .differential = {1, 1},
+                     .root_kind = {1},
+                     .when_root = {0},
+                     .when_period = {-1}};
+    builder.n_inputs = 1;
+    builder.n_channels = 2;
+    const int32_t channel[] = {0, 0, 0, 0, 2, 0};
+    memcpy(builder.channel, channel, sizeof channel);
+    for (int k = 0; k < 101; ++k) {
+        value[k] = sin(0.37 * k) + 0.3 * sin(1.9 * k);
+    }
+    builder_inline_series(&builder, 2, 2, 0, 0.0, 0.1, 10.0, NULL, value, 101);
+    builder_link(&builder);
+    return write_bytes(&builder.writer, BUSY);
+}
 
 /* An RC circuit; one channel has a name that CSV must quote. */
 static int write_model(void **state)
@@ -40,13 +85,7 @@ static int write_model(void **state)
     const char *const units[] = {"V", "J"};
     writer_texts(&builder.writer, "channel_names", names, 2);
     writer_texts(&builder.writer, "channel_units", units, 2);
-    size_t size = 0;
-    unsigned char *bytes = writer_bytes(&builder.writer, &size);
-    writer_clear(&builder.writer);
-    FILE *file = fopen(MODEL, "wb");
-    const int failed = file == NULL || fwrite(bytes, 1, size, file) != size || fclose(file) != 0;
-    free(bytes);
-    return failed;
+    return write_bytes(&builder.writer, MODEL) != 0 || write_busy_model() != 0;
 }
 
 static int remove_files(void **state)
@@ -55,13 +94,16 @@ static int remove_files(void **state)
     unlink(MODEL);
     unlink(CSV);
     unlink(WORDS);
+    unlink(BUSY);
+    unlink(WHOLE);
+    unlink(SAVED);
     return 0;
 }
 
-/* Starts gust-run with up to 8 arguments; stdout and stderr go to WORDS. */
+/* Starts gust-run with up to 20 arguments; stdout and stderr go to WORDS. */
 static pid_t start(const char *const arguments[])
 {
-    char *argv[12] = {(char[]){"gust-run"}};
+    char *argv[24] = {(char[]){"gust-run"}};
     int count = 1;
     for (; arguments[count - 1] != NULL; ++count) {
         argv[count] = strdup(arguments[count - 1]);
@@ -188,9 +230,98 @@ static void interrupted(void **state)
     }
 }
 
+static void same_files(const char *one, const char *other)
+{
+    FILE *a = fopen(one, "rb");
+    FILE *b = fopen(other, "rb");
+    assert_non_null(a);
+    assert_non_null(b);
+    long at = 0;
+    for (int c = 0; c != EOF; ++at) {
+        c = fgetc(a);
+        if (c != fgetc(b)) {
+            fail_msg("%s and %s differ at byte %ld", one, other, at);
+        }
+    }
+    fclose(a);
+    fclose(b);
+}
+
+#define BUSY_ARGUMENTS(OUT)                                                                                    \
+    BUSY, "--until", "200", "--every", "0.02", "--checkpoint", SAVED, "--checkpoint-every", "1.7", "--out", OUT
+
+/* Killed at random moments, as often as it takes, and started again: the rows are those of a run that was left
+ * alone, to the last byte. */
+static void killed(void **state)
+{
+    (void)state;
+    unlink(SAVED);
+    assert_int_equal(run((const char *const[]){BUSY_ARGUMENTS(WHOLE), NULL}), 0);
+    unlink(SAVED);
+    unlink(CSV);
+    srand(3);
+    int kills = 0;
+    int resumed = 0;
+    for (;;) {
+        const bool again = access(SAVED, R_OK) == 0;
+        const char *const first[] = {BUSY_ARGUMENTS(CSV), NULL};
+        const char *const next[] = {BUSY_ARGUMENTS(CSV), "--resume", SAVED, NULL};
+        const pid_t child = start(again ? next : first);
+        resumed += again ? 1 : 0;
+        /* the later the longer, so that it comes to an end on any machine */
+        const struct timespec moment = {0, rand() % 60000000 + 1000000L * kills};
+        nanosleep(&moment, NULL);
+        int result = 0;
+        kill(child, SIGKILL);
+        while (waitpid(child, &result, 0) < 0) {
+            assert_int_equal(errno, EINTR);
+        }
+        if (WIFEXITED(result)) {
+            if (WEXITSTATUS(result) != 0) {
+                fail_msg("%s", content(WORDS));
+            }
+            break;
+        }
+        ++kills;
+    }
+    assert_true(kills > 2 && resumed > 2);
+    same_files(CSV, WHOLE);
+    /* at the end there is nothing left to do, and nothing is lost by asking */
+    assert_int_equal(run((const char *const[]){BUSY_ARGUMENTS(CSV), "--resume", SAVED, NULL}), 0);
+    same_files(CSV, WHOLE);
+}
+
+static void cannot_resume(void **state)
+{
+    (void)state;
+    assert_int_equal(run((const char *const[]){BUSY_ARGUMENTS(CSV), NULL}), 0);
+    assert_int_equal(run((const char *const[]){BUSY_ARGUMENTS(CSV), "--resume", "/nonexistent", NULL}), 1);
+    assert_says(content(WORDS), "CHECKPOINT_UNREADABLE");
+    assert_int_equal(run((const char *const[]){BUSY_ARGUMENTS(CSV), "--resume", BUSY, NULL}), 1);
+    assert_says(content(WORDS), "BAD_CHECKPOINT");
+    assert_int_equal(run((const char *const[]){BUSY_ARGUMENTS(CSV), "--rtol", "1e-5", "--resume", SAVED, NULL}),
+                     1);
+    assert_says(content(WORDS), "rtol");
+    assert_int_equal(run((const char *const[]){MODEL, "--until", "200", "--every", "0.02", "--out", CSV,
+                                               "--resume", SAVED, NULL}),
+                     1);
+    assert_says(content(WORDS), "another model");
+    assert_int_equal(truncate(CSV, 500), 0);
+    assert_int_equal(run((const char *const[]){BUSY_ARGUMENTS(CSV), "--resume", SAVED, NULL}), 1);
+    assert_says(content(WORDS), "before the checkpoint");
+    assert_int_equal(run((const char *const[]){BUSY, "--until", "1", "--checkpoint", SAVED, NULL}), 2);
+    assert_int_equal(run((const char *const[]){BUSY, "--until", "1", "--checkpoint-every", "0", NULL}), 2);
+    assert_int_equal(run((const char *const[]){BUSY, "--until", "1", "--resume", NULL}), 2);
+    assert_int_equal(run((const char *const[]){BUSY, "--until", "3", "--checkpoint", "/nonexistent/x",
+                                               "--checkpoint-every", "1", NULL}),
+                     1);
+    assert_says(content(WORDS), "CHECKPOINT_FAILED");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(writes_csv), cmocka_unit_test(refuses),
-                                       cmocka_unit_test(interrupted)};
+                                       cmocka_unit_test(interrupted), cmocka_unit_test(killed),
+                                       cmocka_unit_test(cannot_resume)};
     return cmocka_run_group_tests(tests, write_model, remove_files);
 }

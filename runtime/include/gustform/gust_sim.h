@@ -15,6 +15,7 @@
 #ifndef GUSTFORM_GUST_SIM_H
 #define GUSTFORM_GUST_SIM_H
 
+#include <stddef.h>
 #include <stdint.h>
 
 #include "gust_export.h"
@@ -108,6 +109,34 @@ GUST_API void gust_sim_request_stop(gust_sim *sim);
 
 /* Simulated time reached (s). */
 GUST_API double gust_sim_time(const gust_sim *sim);
+
+/* Checkpoints: everything the run needs to go on, in another process or after a crash.
+ *
+ *     gust_sim_advance(sim, next, &reached);   // rows up to `next` have been handed over: write them out first
+ *     gust_sim_checkpoint(sim, "run.gustck");
+ *
+ *     gust_sim_create ... options, readers, sink and statistics as before ... gust_sim_initialise(sim, t0);
+ *     gust_sim_restore(sim, "run.gustck");     // gust_sim_statistics(...).rows: how many rows there were
+ *     gust_sim_advance(sim, until, &reached);
+ *
+ * The integrator starts anew at a checkpoint, in the run that writes it as in the one that takes it up: both
+ * then take the same steps and give the same rows, bit for bit, on one machine and build of this library. A
+ * checkpoint does not depend on where the model file lies. */
+
+/* After initialise: state at the time reached, into the file `path`, which is replaced in one go: whatever
+ * happens, it holds this checkpoint or the one before. NULL: no file. CHECKPOINT_FAILED: not written, the
+ * simulation can go on. Does not allocate. */
+GUST_API gust_status gust_sim_checkpoint(gust_sim *sim, const char *path);
+
+/* Bytes of the last checkpoint; they belong to the simulation and hold until the next one. */
+GUST_API gust_status gust_sim_checkpoint_bytes(const gust_sim *sim, const void **bytes, size_t *size);
+
+/* After initialise, at any time: to the state of a checkpoint. FOREIGN_CHECKPOINT: it belongs to another model,
+ * other options, another sink or other statistics; BAD_CHECKPOINT: it is damaged or none;
+ * CHECKPOINT_UNREADABLE: there is no such file. After these the simulation is as it was, unless the message
+ * says otherwise. May allocate, as initialise does. */
+GUST_API gust_status gust_sim_restore(gust_sim *sim, const char *path);
+GUST_API gust_status gust_sim_restore_bytes(gust_sim *sim, const void *bytes, size_t size);
 
 /* What the last status that was not GUST_OK was about; "" if there was none. Belongs to the simulation. */
 GUST_API const char *gust_sim_message(const gust_sim *sim);
