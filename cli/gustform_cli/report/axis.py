@@ -64,6 +64,11 @@ def decades(low: float, high: float, label: str = "") -> Axis:
     return Axis(low, high, tuple(10.0**k for k in powers), texts, label, log=True)
 
 
+def categories(names: Sequence[str], label: str = "") -> Axis:
+    """Texts side by side, at 0, 1, 2 ..."""
+    return Axis(-0.5, len(names) - 0.5, tuple(float(k) for k in range(len(names))), tuple(names), label)
+
+
 def _round_step(step: float) -> float:
     power = 10.0 ** math.floor(math.log10(step))
     return next(power * k for k in (1.0, 2.0, 2.5, 5.0, 10.0) if power * k >= step * (1.0 - 1e-9))

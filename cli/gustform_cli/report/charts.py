@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 COLOURS = 6  # classes c1 ... c6 of the style sheet; more lines begin again
 _LEFT, _RIGHT, _TOP, _BOTTOM = 52.0, 14.0, 10.0, 38.0
 _MOST_POINTS = 900  # of a line: two for each pixel it can have
-_TITLED_POINTS = 1200  # of a scatter; more are drawn without their names
+_TITLED_POINTS = 400  # of a scatter; more are drawn without their names
 
 
 @dataclass(frozen=True)
@@ -88,12 +88,10 @@ def lines(
     for number, curve in enumerate(curves):
         colour, values = f"c{number % COLOURS + 1}", curve.y
         if values.ndim > 1:
-            px, low = _thin(curve.x, values.min(axis=1))
-            qx, high = _thin(curve.x, values.max(axis=1))
-            outline = frame.points(np.concatenate([px, qx[::-1]]), np.concatenate([low, high[::-1]]))
-            drawn.append(tag("path", class_=f"band {colour}", d=f"M{outline}Z"))
+            x_band, low, high = _thin_band(curve.x, values.min(axis=1), values.max(axis=1))
+            drawn.append(tag("path", class_=f"band {colour}", d=frame.outline(x_band, low, high)))
             values = values.mean(axis=1)
-        drawn.append(tag("path", class_=f"line {colour}", d=f"M{frame.points(*_thin(curve.x, values))}"))
+        drawn.append(tag("path", class_=f"line {colour}", d=frame.path(*_thin(curve.x, values))))
     drawn += [_mark(frame, mark) for mark in marks]
     named = [curve.label + (f", mean and range of {curve.y.shape[1]}" if curve.y.ndim > 1 else "") for curve in curves]
     ranges = "; ".join(
@@ -139,7 +137,7 @@ def scatter(title: str, x: Axis, y: Axis, clouds: Sequence[Points], trend: Line 
             path = "".join(f"M{px:.1f} {py:.1f}h0" for px, py in zip(*frame.pixels(cloud.x, cloud.y), strict=True))
             drawn.append(tag("path", class_=f"dots {colour}", d=path))
     if trend is not None:
-        drawn.append(tag("path", class_="trend", d=f"M{frame.points(trend.x, trend.y)}"))
+        drawn.append(tag("path", class_="trend", d=frame.path(trend.x, trend.y)))
     legend = [cloud.label for cloud in clouds] if len(clouds) > 1 else []
     return _figure(title, y.label, frame, drawn, alt or f"{title} over {x.label}", legend)
 
@@ -161,13 +159,23 @@ class _Frame:
     def pixels(self, x: Floats, y: Floats) -> tuple[list[float], list[float]]:
         return [self.x(value) for value in x.tolist()], [self.y(value) for value in y.tolist()]
 
-    def points(self, x: Floats, y: Floats) -> str:
+    def path(self, x: Floats, y: Floats) -> str:
+        """A line that is broken where there is no value."""
         known = np.isfinite(x) & np.isfinite(y)
+        begins = np.flatnonzero(known & ~np.concatenate([[False], known[:-1]]))
+        ends = np.flatnonzero(known & ~np.concatenate([known[1:], [False]])) + 1
+        return "".join(f"M{self._joined(x[b:e], y[b:e])}" for b, e in zip(begins, ends, strict=True))
+
+    def outline(self, x: Floats, low: Floats, high: Floats) -> str:
+        """The area between two lines."""
+        known = np.isfinite(low) & np.isfinite(high)
+        x, low, high = x[known], low[known], high[known]
+        return f"M{self._joined(np.concatenate([x, x[::-1]]), np.concatenate([low, high[::-1]]))}Z"
+
+    def _joined(self, x: Floats, y: Floats) -> str:
         # Beyond the frame is cut by the drawing; far beyond it would be nothing but long numbers.
-        return "L".join(
-            f"{px:.1f} {min(max(py, -999.0), 999.0):.1f}"
-            for px, py in zip(*self.pixels(x[known], y[known]), strict=True)
-        )
+        points = (f"{px:.1f} {min(max(py, -999.0), 999.0):.1f}" for px, py in zip(*self.pixels(x, y), strict=True))
+        return "L".join(points) if x.size > 1 else f"{next(points, '0 0')}h0"
 
     def grid(self) -> Content:
         right, bottom = self.right, self.bottom
@@ -240,8 +248,18 @@ def _thin(x: Floats, y: Floats) -> tuple[Floats, Floats]:
         return x, y
     rows = 2 * -(-x.size // _MOST_POINTS)
     whole = x.size // rows * rows
-    bins = y[:whole].reshape(-1, rows)
+    bins = np.nan_to_num(y[:whole].reshape(-1, rows), nan=0.0)
     first = np.arange(0, whole, rows)
     low, high = first + bins.argmin(axis=1), first + bins.argmax(axis=1)
     kept = np.unique(np.concatenate([[0], low, high, [x.size - 1]]))
     return x[kept], y[kept]
+
+
+def _thin_band(x: Floats, low: Floats, high: Floats) -> tuple[Floats, Floats, Floats]:
+    """The widest range of each pixel, at its middle."""
+    if x.size <= _MOST_POINTS:
+        return x, low, high
+    rows = -(-x.size // _MOST_POINTS)
+    whole = x.size // rows * rows
+    bins = [values[:whole].reshape(-1, rows) for values in (x, low, high)]
+    return bins[0].mean(axis=1), bins[1].min(axis=1), bins[2].max(axis=1)

@@ -13,19 +13,16 @@ from gustform_cli.report.markup import Content, Html, tag
 _WIDTH = LARGE.width
 _BELOW = 44.0  # for the ticks and the names of the axes
 
-# Viridis (Smith, van der Walt), a colour map of even steps that the colour-blind can read, at ninths.
-_VIRIDIS = np.array(
-    [
-        (68, 1, 84), (72, 40, 120), (62, 74, 137), (49, 104, 142), (38, 130, 142),
-        (31, 158, 137), (53, 183, 121), (109, 205, 89), (180, 222, 44), (253, 231, 37),
-    ],
-    dtype=np.float64,
-)  # fmt: skip
+# Viridis (Smith, van der Walt), of even steps that the colour-blind can read; and Brewer's blue to red for what has a
+# sign.
+VIRIDIS = ("440154", "482878", "3e4a89", "31688e", "26828e", "1f9e89", "35b779", "6dcd59", "b4de2c", "fde725")
+BLUE_RED = ("2166ac", "4393c3", "92c5de", "d1e5f0", "f7f7f7", "fddbc7", "f4a582", "d6604d", "b2182b")
 
 
-def _viridis(share: float) -> tuple[int, int, int]:
-    places = np.linspace(0.0, 1.0, len(_VIRIDIS))
-    red, green, blue = (round(float(np.interp(share, places, _VIRIDIS[:, k]))) for k in range(3))
+def _colour(colours: Sequence[str], share: float) -> tuple[int, int, int]:
+    places = np.linspace(0.0, 1.0, len(colours))
+    parts = [[int(colour[k : k + 2], 16) for colour in colours] for k in (0, 2, 4)]
+    red, green, blue = (round(float(np.interp(share, places, part))) for part in parts)
     return red, green, blue
 
 
@@ -37,14 +34,19 @@ def heat_map(
     values: NDArray[np.float64],
     written: Sequence[Sequence[str]],
     alt: str,
+    colours: Sequence[str] = VIRIDIS,
+    span: tuple[float, float] | None = None,
 ) -> Html:
-    """Values over two axes, (rows, columns), the first row at the bottom; NaN stays empty. Cells bear their numbers."""
+    """Values over two axes, (rows, columns), the first row at the bottom; NaN stays empty. Cells bear their numbers.
+
+    `span`: what the ends of the colours stand for, the smallest and the largest value if left out.
+    """
     (across, over), (up, beside) = columns, rows
     high, wide = values.shape
     left, bottom = 14.0 + 6.6 * max(len(text) for text in beside), _BELOW
     height = min(34.0 * high, 380.0)
     cell_x, cell_y = (_WIDTH - left - 4.0) / wide, height / high
-    low, top = float(np.nanmin(values)), float(np.nanmax(values))
+    low, top = span if span is not None else (float(np.nanmin(values)), float(np.nanmax(values)))
     drawn: list[Content] = []
     for i in range(high):
         y = 6.0 + (high - 1 - i) * cell_y
@@ -52,7 +54,7 @@ def heat_map(
             if not np.isfinite(values[i, j]):
                 continue
             share = (values[i, j] - low) / (top - low) if top > low else 0.5
-            red, green, blue = _viridis(float(share))
+            red, green, blue = _colour(colours, float(share))
             name = f"{across} {over[j]}, {up} {beside[i]}: {written[i][j]} {unit}".rstrip()
             drawn.append(
                 tag(
@@ -80,14 +82,20 @@ def heat_map(
                     text_anchor="end",
                 )
             )
-    widest = 6.6 * max(len(text) for text in over) + 6.0
-    every = max(1, int(np.ceil(widest / cell_x)))
+    # Long names stand on two lines in turn; where they do not fit even so, every second, third ... one is written.
+    widest = 6.8 * max(len(text) for text in over) + 6.0
+    lines = 2 if cell_x < widest <= 2.0 * cell_x else 1
+    every = max(1, int(np.ceil(widest / (lines * cell_x))))
     for j in range(0, wide, every):
-        x = left + (j + 0.5) * cell_x
-        drawn.append(tag("text", over[j], class_="tick", x=f"{x:.1f}", y=f"{height + 20:.1f}", text_anchor="middle"))
+        x, y = left + (j + 0.5) * cell_x, height + 20.0 + 14.0 * (j // every % lines)
+        # The outermost ones must not be cut.
+        x = min(max(x, 0.5 * widest), _WIDTH - 0.5 * widest)
+        drawn.append(tag("text", over[j], class_="tick", x=f"{x:.1f}", y=f"{y:.1f}", text_anchor="middle"))
+    bottom += 14.0 * (lines - 1) - (16.0 if not across and not up else 0.0)
     whole = height + 6.0 + bottom
     drawn.append(tag("text", across, class_="label", x=f"{_WIDTH - 4:.1f}", y=f"{whole - 4:.1f}", text_anchor="end"))
-    drawn.append(tag("text", f"↑ {up}", class_="label", x="4", y=f"{whole - 4:.1f}"))
+    if up:
+        drawn.append(tag("text", f"↑ {up}", class_="label", x="4", y=f"{whole - 4:.1f}"))
     return tag(
         "figure",
         tag("figcaption", tag("b", title), tag("span", unit, class_="unit") if unit else None),

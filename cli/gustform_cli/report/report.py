@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from gustform.language.errors import GustformError
+from gustform_cli.report.campaign_folder import is_campaign
 from gustform_cli.report.run_folder import is_run
 
 PAGE = "report.html"
@@ -15,7 +16,11 @@ def write_report(folder: Path, out: Path | None = None) -> Path:
 
     GF7002 if the folder holds neither, GF7001 if the page cannot be written.
     """
-    if is_run(folder):
+    if is_campaign(folder):
+        from gustform_cli.report.campaign_page import campaign_page
+
+        text = campaign_page(folder)
+    elif is_run(folder):
         from gustform_cli.report.run_page import run_page
 
         text = run_page(folder)

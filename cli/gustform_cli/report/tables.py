@@ -8,6 +8,8 @@ from dataclasses import dataclass
 
 from gustform_cli.report.markup import Content, Html, tag
 
+_TALL = 40  # rows; a longer table scrolls in a box
+
 
 @dataclass(frozen=True)
 class Cell:
@@ -33,7 +35,9 @@ def table(
     )
     body = [tag("tr", [_cell(cell, r) for cell, r in zip(row, right, strict=True)]) for row in written]
     whole = tag("table", tag("thead", head), tag("tbody", body), class_="sortable" if sortable else None)
-    return tag("div", whole, class_="scroll fit" if fit else "scroll")
+    kind = "scroll fit" if fit else "scroll tall" if len(written) > _TALL else "scroll"
+    # A box that scrolls must be reached by the keyboard.
+    return tag("div", whole, class_=kind, tabindex="0" if kind == "scroll tall" else None)
 
 
 def facts(pairs: Iterable[tuple[Content, Content]]) -> Html:
