@@ -12,7 +12,9 @@ GF2105 --set does not fit       GF2205 not a valid name      GF2405 event target
 GF2301 unit missing             GF2501 wind file missing     GF2406 no channel matches
 GF2302 another dimension        GF2502 wind file empty       GF2505 wind file: not a number
 GF2303 unit not understood      GF2503 no such column        GF2506 wind file does not cover the run
-                                GF2504 stamps not increasing
+GF2504 stamps not increasing    GF2507 speed that no wind has   GF2508 not the format, or cut short
+GF2509 shape does not fit       GF2510 gap in the wind file     GF2511 times, zone and start do not fit
+GF2512 package not installed    GF2513 samples too far apart
 GF7001 result folder not writable   GF7002 result cannot be read   GF7003 file exists already
 """
 

@@ -198,7 +198,7 @@ def _table_source(block: FileWind, kind: str, site: Site) -> WindSource:
         on_end=block.on_end,
         t_end=found.last,
     )
-    return WindSource(series, reader, tuple(warnings))
+    return WindSource(series, reader, tuple(warnings), found.longest_step)
 
 
 # ---- boxes ----------------------------------------------------------------------------------------------------------

@@ -19,6 +19,7 @@ from gustform_cli.wind.clean import HIGHEST_SPEED, LOWEST_SPEED, Findings, Polic
 from gustform_cli.wind.table import Position, Rows, TableFile, place
 
 _MOST_ENTRIES = 2048  # of the index; beyond, every other one goes
+_STANDSTILL = 8  # equal samples in a row, over which a solver's steps grow beyond the spacing of the samples
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,7 @@ class Survey:
     last: float
     mean: float
     deviation: float
+    longest_step: float  # of a solver that is to miss no sample, s; infinite where the wind always moves
     findings: Findings
     warnings: tuple[str, ...]
 
@@ -70,6 +72,7 @@ def survey(table: TableFile, policy: Policy, until: float) -> Survey:
         )
     findings, moments, index = Findings(), _Moments(), list[Entry]()
     samples, first, last, stride, state = 0, math.nan, math.nan, 1, State()
+    longest_step = math.inf
     for number, (position, skip, rows) in enumerate(_walk(table, begin)):
         if number % stride == 0:
             index.append(Entry(samples, position, skip, state))
@@ -86,13 +89,15 @@ def survey(table: TableFile, policy: Policy, until: float) -> Survey:
             last = float(times[-1])
             samples += times.size
             moments.add(times, speeds)
+            longest_step = min(longest_step, _longest_step(times, speeds, policy.spacing))
         if reached.size:
             break
     _judge(table, policy, findings)
     warnings = (*table.warnings, *_warnings(table, policy, findings))
     return Survey(
-        table, policy, tuple(index), samples, first, last, moments.mean, moments.deviation, findings, warnings
-    )
+        table, policy, tuple(index), samples, first, last, moments.mean, moments.deviation, longest_step, findings,
+        warnings,
+    )  # fmt: skip
 
 
 class TableWind:
@@ -198,6 +203,23 @@ def _regular(table: TableFile, begin: Entry) -> float | None:
         equal = np.abs(steps - usual) < 0.01 * usual
         return usual if np.count_nonzero(equal) >= 0.8 * steps.size else None
     return None
+
+
+def _longest_step(times: NDArray[np.float64], speeds: NDArray[np.float64], spacing: float | None) -> float:
+    """Where a wind stands still, a free-running solver takes long steps; a gust that comes after and passes again
+    within one of them would be missed. In a regular table steps are then no longer than its spacing, in a polyline half
+    the shortest time in which the wind leaves a speed that it had kept and comes back to it."""
+    still = np.diff(speeds) == 0.0
+    if spacing is not None:
+        kept = np.diff(np.flatnonzero(np.concatenate(([True], ~still, [True]))))
+        return spacing if kept.size and kept.max() >= _STANDSTILL else math.inf
+    shortest = math.inf
+    for leaving in np.flatnonzero(still[:-1] & ~still[1:]) + 1:
+        away = np.sign(speeds[leaving + 1 :] - speeds[leaving])
+        back = np.flatnonzero(away != away[0])
+        if back.size:
+            shortest = min(shortest, float(times[leaving + 1 + back[0]] - times[leaving]))
+    return 0.5 * shortest
 
 
 class _Moments:

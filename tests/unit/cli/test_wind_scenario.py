@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,9 @@ from gustform_cli import document
 from gustform_cli.assemble import Assembled, assemble
 from gustform_cli.errors import ErrorList
 from gustform_cli.main import app
+from gustform_cli.scenario import validate
 from gustform_cli.wind import files
+from gustform_cli.wind.blocks import FileWind, GustWind, RampWind, StepWind, TurbulentWindBlock
 from gustform_cli.wind.survey import Survey, survey
 from tests.unit.cli.test_wind_formats import field, mann, turbsim
 from tests.unit.cli.wind_data import DATA
@@ -265,6 +268,27 @@ def test_a_gust_is_not_stepped_over(tmp_path: Path) -> None:
     assert abs(rotor - rotor.isel(time=0)).max() > 1e-3, "the rotor has felt it"
 
 
+@pytest.mark.parametrize("name", ["w.csv", "w.hh"])
+def test_a_gust_in_a_file_that_stands_still_is_not_stepped_over(tmp_path: Path, name: str) -> None:
+    if name == "w.csv":
+        rows = "".join(f"{t},{11 if 600 <= t < 606 else 9}\n" for t in range(1201))
+        (tmp_path / name).write_text(f"time,speed\n{rows}")
+    else:
+        bends = {0: 9, 599: 9, 600: 11, 605: 11, 606: 9, 1200: 9}
+        (tmp_path / name).write_text("".join(f"{t} {v} 0 0 0 0 0 0\n" for t, v in bends.items()))
+    wind = f"{{type: file, path: {name}, is: rotor_effective, mean: 9 m/s}}"
+    # The spacing of the rows; half of the 7 s from 599 to 606 s.
+    assert made(wind, tmp_path, "1200 s").longest_step == {"w.csv": 1.0, "w.hh": 3.5}[name]
+    data, _, _ = simulated(tmp_path, wind, "1200 s", "1 s")
+    rotor = data["wt.omega_r"]
+    assert abs(rotor - rotor.isel(time=0)).max() > 1e-3, "the rotor has felt it"
+
+
+def test_moving_wind_limits_no_step(folder: Path) -> None:
+    assert made("{type: file, path: w.csv, is: point}", folder).longest_step == np.inf
+    assert made("{type: file, path: w.hh}", folder).longest_step == np.inf, "it never comes back"
+
+
 def test_measured_wind_drives_a_run(tmp_path: Path) -> None:
     file = DATA / "lhb" / "la-haute-borne_R80711_2014-2015.csv.gz"
     wind = (
@@ -324,3 +348,27 @@ def test_check_reports_a_bad_file_before_the_run(folder: Path) -> None:
     assert run.exit_code == 0, run.stderr
     assert "warning: wind.wt: 1 duplicate stamp, in line 5 (2 s): left out" in run.stderr
     assert len(json.loads(run.stdout)["scenario_warnings"]) == 2
+
+
+# ---- documents ------------------------------------------------------------------------------------------------------
+def test_documented_blocks_are_understood() -> None:
+    page = (Path(__file__).parents[3] / "docs" / "wind.md").read_text()
+    blocks = re.findall(r"^```yaml\n(wind:\n.*?)^```", page, flags=re.DOTALL | re.MULTILINE)
+    assert len(blocks) == 4
+    kinds = set()
+    for block in blocks:
+        plain = "\n".join(line for line in text("x").splitlines() if not line.startswith(("wind:", "  wt: x")))
+        scenario, errors = validate(document.parse(f"{plain}\n{block}", "wind.md"))
+        assert errors == []
+        assert scenario is not None
+        kinds |= {one.type for one in scenario.wind.values()}
+    assert kinds == {"constant", "step", "ramp", "gust", "turbulence", "file"}
+    for code in (f"GF{number}" for number in range(2501, 2514)):
+        assert code in page
+
+
+def test_every_key_of_a_block_is_documented() -> None:
+    page = (Path(__file__).parents[3] / "docs" / "wind.md").read_text()
+    for model in (StepWind, RampWind, GustWind, TurbulentWindBlock, FileWind):
+        for name, key in model.model_fields.items():
+            assert re.search(rf"\b{key.alias or name}\b", page), f"{model.__name__}.{name}"
