@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 _BLOCK_ROWS = 65_536
+_LOOKED_AT = 100_000  # rows, for turbulence
+_REVERSALS = 30  # fewer are a step, a ramp or a gust
 
 
 @dataclass(frozen=True)
@@ -61,6 +63,15 @@ def moments(data: h5py.Dataset, time: h5py.Dataset) -> Moments:
         return Moments(math.nan, math.nan, math.nan, math.nan, math.nan)
     mean = first / rows
     return Moments(shift + mean, math.sqrt(max(0.0, second / rows - mean * mean)), low, high, integral)
+
+
+def turbulent(data: h5py.Dataset) -> bool:
+    """Whether a wind turns often: what is left of a step, a ramp or a gust is no turbulence."""
+    rows = min(data.shape[0], _LOOKED_AT)
+    values = np.asarray(data[:rows], np.float64).reshape(rows, -1)[:, :1].ravel()
+    moved = np.sign(np.diff(values))
+    moved = moved[moved != 0.0]
+    return int((moved[1:] != moved[:-1]).sum()) > _REVERSALS
 
 
 def histogram(data: h5py.Dataset, low: float, high: float, bins: int) -> tuple[Floats, Floats]:

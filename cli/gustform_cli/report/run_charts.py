@@ -10,7 +10,7 @@ import numpy as np
 
 from gustform_cli.panels import FREQUENCY, Panel, filled_panels
 from gustform_cli.report import axis
-from gustform_cli.report.channel_statistics import Moments, histogram, octaves, spectrum
+from gustform_cli.report.channel_statistics import Moments, histogram, octaves, spectrum, turbulent
 from gustform_cli.report.charts import SMALL, Floats, Line, Mark, Vertical, bars, lines
 from gustform_cli.report.markup import Content, Html, tag
 from gustform_cli.report.numbers import pretty, significant
@@ -28,7 +28,6 @@ _MOVED = (
     (".beta", "Pitch angle"),
     (".v_dc", "DC voltage"),
 )
-_REVERSALS = 30  # of the wind: fewer are a step, a ramp or a gust
 
 
 def panels(run: RunFolder, data: RunData) -> Html | None:
@@ -45,7 +44,7 @@ def turbulence(file: h5py.File, found: dict[str, Moments], run: RunFolder) -> Co
     """Distribution and spectrum of a few channels, None where no wind is turbulent."""
     every = _spacing(file["time"])
     rows = file["time"].shape[0]
-    if not any(name.endswith(".wind") and _turbulent(file[name]) for name in found):
+    if not any(name.endswith(".wind") and turbulent(file[name]) for name in found):
         return None
     chosen = [
         (name, title)
@@ -109,14 +108,6 @@ def _nadir(run: RunFolder) -> list[Mark]:
     if nadir is None or at is None or not run.parts["events"]:
         return []
     return [Mark(at, nadir, f"nadir {nadir:.3f} Hz")]
-
-
-def _turbulent(data: h5py.Dataset) -> bool:
-    """Whether the wind turns often: what is left of a step, a ramp or a gust is not worth a spectrum."""
-    values = np.asarray(data[: min(data.shape[0], 100_000)], np.float64).reshape(min(data.shape[0], 100_000), -1)[:, 0]
-    moved = np.sign(np.diff(values))
-    moved = moved[moved != 0.0]
-    return int((moved[1:] != moved[:-1]).sum()) > _REVERSALS
 
 
 def _spacing(time: h5py.Dataset) -> float | None:

@@ -9,7 +9,7 @@ import h5py
 
 from gustform_cli.frequency import ROCOF_WINDOW, SETTLE_AFTER
 from gustform_cli.progress import times
-from gustform_cli.report.channel_statistics import Moments
+from gustform_cli.report.channel_statistics import Moments, turbulent
 from gustform_cli.report.numbers import duration, significant
 from gustform_cli.report.run_folder import RunFolder
 from gustform_cli.report.tables import Figure
@@ -24,7 +24,7 @@ def key_numbers(run: RunFolder, file: h5py.File | None, found: Mapping[str, Mome
     if file is not None and "time" in file and file["time"].shape[0] > 1:
         span = float(file["time"][-1] - file["time"][0])
         for name in _turbines(found)[:_TURBINES]:
-            figures += _turbine(name, found, span)
+            figures += _turbine(name, file, found, span)
     figures += _computation(run)
     return figures
 
@@ -49,17 +49,15 @@ def _turbines(found: Mapping[str, Moments]) -> list[str]:
     return [name.removesuffix(".wind") for name in found if name.endswith(".wind") and name.count(".") == 1]
 
 
-def _turbine(name: str, found: Mapping[str, Moments], span: float) -> Iterator[Figure]:
+def _turbine(name: str, file: h5py.File, found: Mapping[str, Moments], span: float) -> Iterator[Figure]:
     wind = found[f"{name}.wind"]
-    if wind.spread > 1e-6:
-        yield Figure(
-            f"Wind of {name}",
-            significant(wind.mean, 3),
-            "m/s",
-            f"turbulence intensity {100 * wind.std / wind.mean:.1f} %",
-        )
+    if turbulent(file[f"{name}.wind"]):
+        note = f"turbulence intensity {100 * wind.std / wind.mean:.1f} %"
+    elif wind.spread > 1e-6:
+        note = f"{significant(wind.low, 3)} … {significant(wind.high, 3)} m/s"
     else:
-        yield Figure(f"Wind of {name}", significant(wind.mean, 3), "m/s", "constant")
+        note = "constant"
+    yield Figure(f"Wind of {name}", significant(wind.mean, 3), "m/s", note)
     power, per_unit = found.get(f"{name}.P"), found.get(f"{name}.P_gsc")
     if power is not None:
         megawatt_hours = power.integral / _JOULES_PER_WH / 1e6
