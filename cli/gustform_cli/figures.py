@@ -157,7 +157,11 @@ def _keep_height(axis: Axes, least: float) -> None:
 
 def _name_events(axis: Axes, run: RunData) -> None:
     """What happens at the dashed lines, once, in the first panel."""
-    for event in (run.json("events") or ())[:4]:
+    events = (run.json("events") or ())[:4]
+    if events:
+        low, high = axis.get_ylim()
+        axis.set_ylim(low, high + 0.12 * (high - low))  # room for the text above the curves
+    for event in events:
         text = ", ".join(f"{target} = {value}" for target, value in event["set"].items())
         axis.annotate(
             text,
