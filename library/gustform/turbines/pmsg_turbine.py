@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+
 from gustform.aero.closed_form_rotor import ClosedFormRotor
+from gustform.aero.cp_solver import cp_solver, inside
 from gustform.aero.rotor import Rotor
 from gustform.control.converter_control import ConverterControl
 from gustform.control.curtailment_schedule import CurtailmentSchedule, observer_table, pitch_table, speed_table
@@ -31,7 +34,7 @@ from gustform.electrical.pmsg import Pmsg
 from gustform.electrical.transformer import Transformer
 from gustform.electrical.transformer_dq import TransformerDq
 from gustform.interfaces import AcPort
-from gustform.language import Component, Input, Output, Parameter, Part, Variable
+from gustform.language import Component, Input, Output, Parameter, Part, Variable, maximum, minimum
 from gustform.mechanical.drive_train import DriveTrain
 from gustform.mechanical.one_mass import OneMass
 from gustform.turbines import stages
@@ -86,6 +89,12 @@ class PmsgTurbine(Component):
     )
     K_msc = Parameter("pu", "droop of the machine side", default=lambda self: self.gains().K_msc, min=0.0)
     K_p = Parameter("deg", "pitch for speed, deg/pu", default=lambda self: self.gains().K_p, min=0.0)
+    Cp_max = Parameter(
+        "1",
+        "highest power coefficient at beta_min, of the available power",
+        default=lambda self: self.cp_max(),
+        above=0.0,
+    )
 
     wind = Input("m/s", "rotor-effective wind speed", start=8.0, nominal=10.0)
     frame = Input("pu", "speed of the phasor frame, base f0", start=1.0)
@@ -201,6 +210,8 @@ class PmsgTurbine(Component):
     beta = Variable("deg", "pitch angle", nominal=10.0)
     frequency = Variable("Hz", "frequency of the GSC voltage", start=NOMINAL_FREQUENCY, nominal=NOMINAL_FREQUENCY)
     P_wt = Variable("pu", "power from the wind, base rating", start=lambda self: self.power_start())
+    P_available = Variable("pu", "power that the wind offers at Cp_max, at most the rating, base rating", start=0.5)
+    P_reserve = Variable("pu", "available power that is not taken, P_available - P_wt, base rating")
     P_pmsg = Variable("pu", "power from the machine into the MSC, base rating", start=0.5)
     P_gsc = Variable("pu", "active power out of the GSC, base rating", start=0.5)
     Q_gsc = Variable("pu", "reactive power out of the GSC, base rating")
@@ -223,6 +234,12 @@ class PmsgTurbine(Component):
     def power_start(self) -> float:
         """First guess of the power: that of the rotor at omega_del and beta_del, pu."""
         return power_at(self.rotor, self.wind_speed, self.omega_del, self.beta_del, self.limits())
+
+    def cp_max(self) -> float:
+        """The highest Cp at beta_min."""
+        aero = cp_solver(self.rotor)
+        beta = inside(float(self.beta_min), aero.pitches)
+        return float(aero.value(aero.mpp(beta), beta))
 
     def gains(self) -> DualPortGains:
         """The largest gains of dual-port control that the operating point allows."""
@@ -256,6 +273,10 @@ class PmsgTurbine(Component):
         self.eq(self.dv_dc, self.der(self.dc_link.v) / self.v_dc_base)
         self.eq(self.omega_r, drive.w / self.omega_base)
         self.eq(self.P_wt, rotor.P / self.rating)
+        v = maximum(self.wind, rotor.wind_min)
+        per_cube = 0.5 * math.pi * rotor.efficiency * rotor.density * rotor.radius * rotor.radius
+        self.eq(self.P_available, minimum(per_cube * self.Cp_max * (v * v * v) / self.rating, 1.0))
+        self.eq(self.P_reserve, self.P_available - self.P_wt)
         self.eq(self.P_pmsg, msc.P / self.rating)
         self.eq(self.P_gsc, gsc.P / self.rating)
         self.eq(self.Q_gsc, gsc.Q / self.rating)
