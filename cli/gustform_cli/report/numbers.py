@@ -79,6 +79,11 @@ def duration(seconds: float) -> str:
     return f"{significant(seconds / divisor)} {name}"
 
 
+def moment(seconds: float) -> str:
+    """A time of a run: 42.66 s, 8.333 h where seconds would be many."""
+    return f"{seconds:.2f} s" if seconds < 9000.0 else f"{seconds / 3600.0:.3f} h"
+
+
 def size(number: int) -> str:
     """Bytes."""
     for factor, name in ((1 << 30, "GB"), (1 << 20, "MB"), (1 << 10, "kB")):

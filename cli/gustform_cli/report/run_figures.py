@@ -10,7 +10,7 @@ import h5py
 from gustform_cli.frequency import ROCOF_WINDOW, SETTLE_AFTER
 from gustform_cli.progress import times
 from gustform_cli.report.channel_statistics import Moments, turbulent
-from gustform_cli.report.numbers import duration, significant
+from gustform_cli.report.numbers import duration, moment, significant
 from gustform_cli.report.run_folder import RunFolder
 from gustform_cli.report.tables import Figure
 
@@ -33,7 +33,7 @@ def _frequency(run: RunFolder) -> Iterator[Figure]:
     frequency = run.summary.get("frequency") or {}
     nadir, at = frequency.get("nadir_hz"), frequency.get("nadir_time_s")
     if nadir is not None:
-        yield Figure("Frequency nadir", f"{nadir:.3f}", "Hz", f"at {at:.2f} s" if at is not None else "")
+        yield Figure("Frequency nadir", f"{nadir:.3f}", "Hz", f"at {moment(at)}" if at is not None else "")
     settled = frequency.get("settle_hz")
     if settled is not None:
         begin = min((float(event["at"]) for event in run.parts["events"] or ()), default=math.inf)

@@ -10,7 +10,7 @@ from gustform.language.errors import GustformError
 from gustform_cli.report import run_charts, run_tables
 from gustform_cli.report.channel_statistics import Moments, moments
 from gustform_cli.report.markup import Content, Html, tag
-from gustform_cli.report.numbers import count, duration, significant
+from gustform_cli.report.numbers import count, duration, moment
 from gustform_cli.report.page import Head, Section, page
 from gustform_cli.report.run_figures import key_numbers
 from gustform_cli.report.run_folder import RunFolder, read_run
@@ -106,14 +106,14 @@ def _warnings(run: RunFolder, without: str) -> Html | None:
     if run.status == "failed":
         said.append(("bad", f"The run failed. {message or ''}"))
     elif run.status == "interrupted":
-        reached = significant(float(run.summary.get("simulated_seconds", 0.0)))
-        said.append(("warn", f"The run was interrupted at {reached} s; what follows is over that time."))
+        reached = moment(float(run.summary.get("simulated_seconds", 0.0)))
+        said.append(("warn", f"The run was interrupted at {reached}; what follows is over that time."))
     elif run.status == "unfinished":
         said.append(
             ("warn", "The run has not ended: it goes on still, or was killed. What follows is what was stored.")
         )
     for name, at in (run.summary.get("trips") or {}).items():
-        said.append(("bad", f"{name} tripped at {significant(float(at))} s."))
+        said.append(("bad", f"{name} tripped at {moment(float(at))}."))
     if without:
         said.append(("warn", f"There are no curves: {without}."))
     given = run.summary.get("warnings") or run.parts["warnings"] or ()

@@ -161,7 +161,7 @@ def test_a_run_that_failed_at_once_gives_a_page(tmp_path: Path, n: int) -> None:
 def test_an_interrupted_run_says_where(tmp_path: Path) -> None:
     write_result(tmp_path / "result.nc", np.linspace(0, 4, 41), rows(41), {"status": "interrupted"})
     write_summary(tmp_path, status="interrupted", simulated_seconds=4.0)
-    assert "interrupted at 4 s" in page_of(tmp_path).text
+    assert "interrupted at 4.00 s" in page_of(tmp_path).text
 
 
 def test_a_damaged_result_leaves_the_numbers(tmp_path: Path) -> None:
