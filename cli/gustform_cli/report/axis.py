@@ -20,6 +20,7 @@ class Axis:
     texts: tuple[str, ...]
     label: str = ""
     log: bool = False
+    texts_are_long: bool = False  # names, not numbers: they stand on two lines in turn
 
     def place(self, value: float) -> float:
         """0 at the low end, 1 at the high end."""
@@ -66,7 +67,9 @@ def decades(low: float, high: float, label: str = "") -> Axis:
 
 def categories(names: Sequence[str], label: str = "") -> Axis:
     """Texts side by side, at 0, 1, 2 ..."""
-    return Axis(-0.5, len(names) - 0.5, tuple(float(k) for k in range(len(names))), tuple(names), label)
+    return Axis(
+        -0.5, len(names) - 0.5, tuple(float(k) for k in range(len(names))), tuple(names), label, texts_are_long=True
+    )
 
 
 def _round_step(step: float) -> float:

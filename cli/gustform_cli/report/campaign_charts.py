@@ -7,6 +7,7 @@ repetitions.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -15,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gustform_cli.report import axis as axes
-from gustform_cli.report.campaign_folder import Campaign, Column
+from gustform_cli.report.campaign_folder import WEIGHT, Campaign, Column
 from gustform_cli.report.charts import COLOURS, SMALL, Line, Points, lines, scatter
 from gustform_cli.report.heat_map import BLUE_RED, heat_map
 from gustform_cli.report.markup import Content, Html, tag
@@ -23,16 +24,31 @@ from gustform_cli.report.numbers import fixed, places, pretty, significant
 
 Floats = NDArray[np.float64]
 
-# Scalars in the order in which they interest, by parts of their names; all others come after these.
-_INTEREST = (
-    "nadir", "rocof", "settle", "trip", "fatigue", "del", "damage", "travel", "energy", "capacity", "v_dc", "omega_r",
-    "P_gsc", "beta",
-)  # fmt: skip
-# What the computation cost is not a result.
-_EFFORT = (
-    "wall", "build", "steps", "evaluations", "factorisations", "iterations", "failures", "restarts", "rows", "unknowns",
-    "real_time", "simulated", "compiled", "events", "wind",
-)  # fmt: skip
+# Scalars in the order in which they interest, by patterns of their names; all others come after these.
+_INTEREST = tuple(
+    re.compile(pattern)
+    for pattern in (
+        r"nadir_hz$|nadir$",
+        "rocof",
+        "settle",
+        r"^trips\.",
+        r"\.del([._]|$)|DEL|fatigue|damage",
+        "travel",
+        "energy",
+        "capacity",
+        r"\.P\.mean$|P_gsc\.mean$",
+        r"omega_r\.max$",
+        r"v_dc\.min$",
+        r"beta\.max$|pitch.*max$",
+        r"(v_dc|\.P|omega_r)\.std$",
+    )
+)
+# What the computation cost is not a result, and what went into it is not one either.
+_EFFORT = re.compile(
+    r"(^|[._])(wall|build|solve|simulated|compiled|unknowns|steps|rows|events|restarts|wind)([._]|$)"
+    r"|evaluations|factorisations|iterations|failures|real_time|nadir_time|_seconds$"
+)
+_OUTER = 2  # dots in wt.P.mean
 _CHARTED = 6  # scalars
 _FOLLOWED = 2  # axes for each scalar where there are more than two
 _FOLLOWS = 0.1  # rank correlation; less is noise
@@ -52,24 +68,36 @@ class _Places:
 
 
 def varied(campaign: Campaign) -> list[Column]:
-    """Axes with more than one value that are no seeds."""
-    return [column for column in campaign.axes if len(column.distinct()) > 1 and not _is_seed(column)]
+    """Axes with more than one value that are neither seeds nor weights, nor follow from one before them."""
+    found: list[Column] = []
+    for column in campaign.axes:
+        if len(column.distinct()) < 2 or is_seed(column) or column.name == WEIGHT:
+            continue
+        if not any(_same(column, before) for before in found):
+            found.append(column)
+    return found
 
 
 def main_scalars(campaign: Campaign) -> list[Column]:
     """Scalars that differ between the cases that are done, the most interesting first."""
     done = campaign.done
-    moving = [
+    return [
         column
-        for column in campaign.scalars
-        if column.numbers is not None
-        and _spread(column.numbers[done]) > 0.0
-        and not any(word in column.name.lower() for word in _EFFORT)
+        for column in by_interest(campaign.scalars)
+        if column.numbers is not None and _spread(column.numbers[done]) > 0.0 and is_outer(column)
     ]
-    order = [name.lower() for name in _INTEREST]
-    return sorted(
-        moving, key=lambda column: next((k for k, word in enumerate(order) if word in column.name.lower()), len(order))
-    )
+
+
+def by_interest(scalars: Sequence[Column]) -> list[Column]:
+    """The most interesting first, else in the order of the table."""
+    last = len(_INTEREST)
+    return sorted(scalars, key=lambda c: next((k for k, word in enumerate(_INTEREST) if word.search(c.name)), last))
+
+
+def is_outer(column: Column) -> bool:
+    """Whether a scalar is a result, and not of a channel inside of a component (wt.control.gsc.xi.mean) or the cost of
+    the computation."""
+    return column.name.count(".") <= _OUTER and not _EFFORT.search(column.name)
 
 
 def charts(campaign: Campaign) -> Content:
@@ -81,12 +109,12 @@ def charts(campaign: Campaign) -> Content:
     if len(over) == 1:
         return tag("div", [_cloud(campaign, scalar, over[0]) for scalar in shown], class_="charts small")
     if len(over) == 2 and _gridded(over[0], over[1]):
-        few, many = sorted(over, key=lambda place: place.distinct.size)
-        across, up = (over[0], over[1]) if over[0].distinct.size >= over[1].distinct.size else (over[1], over[0])
+        # Names go up, where there is room for them, and are told apart by colour.
+        up, across = sorted(over, key=lambda place: (place.column.numbers is not None, place.distinct.size))
         maps = [_map(campaign, scalar, across, up) for scalar in shown]
         parts: list[Content] = [tag("div", maps, class_="charts")]
-        if few.distinct.size <= COLOURS:
-            families = [_family(campaign, scalar, many, few) for scalar in shown]
+        if up.distinct.size <= COLOURS:
+            families = [_family(campaign, scalar, across, up) for scalar in shown]
             parts.append(tag("div", families, class_="charts small"))
         return parts
     ranks = _correlations(campaign, shown, over)
@@ -94,8 +122,22 @@ def charts(campaign: Campaign) -> Content:
     return [_correlation_map(shown, over, ranks), tag("div", small, class_="charts small")]
 
 
-def _is_seed(column: Column) -> bool:
-    return column.name.split(".")[-1] in ("seed", "seeds")
+def is_seed(column: Column) -> bool:
+    """Whether an axis only repeats a case with another wind of the same kind."""
+    return column.name.split(".")[-1] in ("seed", "seed_number")
+
+
+def _same(one: Column, other: Column) -> bool:
+    """Whether each value of one goes with one value of the other, as in a list of values that are set together.
+
+    Where no value comes twice, as in a Latin hypercube, that says something only if both rise or fall together.
+    """
+    pairs = {(str(a), str(b)) for a, b in zip(one.values, other.values, strict=True)}
+    if not len(pairs) == len(one.distinct()) == len(other.distinct()):
+        return False
+    if len(pairs) < len(one.values) or one.numbers is None or other.numbers is None:
+        return True
+    return len(pairs) > 2 and abs(_rank_correlation(one.numbers, other.numbers)) > 1.0 - 1e-9
 
 
 def _spread(values: Floats) -> float:

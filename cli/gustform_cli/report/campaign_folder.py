@@ -1,8 +1,9 @@
 """What a folder of `gustform sweep` holds: the table of cases, and the campaign it came from.
 
-`scalars.parquet` has one row for each case: `case`, the values of the axes, the scalars, `status` and `error`. Which
-columns are axes is in the table's metadata (`gustform`: a JSON mapping with `axes`, `units`, `descriptions`, `cases`,
-`title`, `description`, `versions`) or follows from `axes:` of the campaign's YAML beside it.
+`scalars.parquet` has one row for each case that ended: `case`, the values of the axes, `status`, `error_code`, `error`,
+`result`, the scalars. Its metadata has under `gustform` a JSON mapping with `axes` (names of columns), `units`,
+`descriptions`, `cases` (how many are planned), `title`, `description`, `versions`, `campaign`, `base` (texts of the
+files), `hash`; all of it may be missing.
 """
 
 from __future__ import annotations
@@ -25,15 +26,11 @@ from gustform_cli.report.numbers import scale
 if TYPE_CHECKING:
     import pyarrow as pa
 
-TABLE, CAMPAIGN, RUNS = "scalars.parquet", "campaign.yaml", "runs"
+TABLE, CAMPAIGN, JOURNAL = "scalars.parquet", "campaign.yaml", "journal.jsonl"
 DONE = ("completed", "done")
-_FIXED = ("case", "status", "error", "message")
+_FIXED = ("case", "status", "error_code", "error", "result")
+WEIGHT = "weight"  # share of the time that a case stands for; among the axes, but follows from them
 _QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\s\d].*)?")
-# Units of scalars that carry them in their names.
-_SUFFIXES = (
-    ("_hz_per_s", "Hz/s"), ("_hz", "Hz"), ("_seconds", "s"), ("_s", "s"), ("_mwh", "MWh"), ("_mw", "MW"), ("_pu", "pu"),
-    ("_deg", "deg"), ("_nm", "N*m"),
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -52,9 +49,14 @@ class Column:
         return f"{self.name}, {self.unit}" if self.unit else self.name
 
     def distinct(self) -> list[Any]:
-        """The values that occur, in order."""
-        known = {value for value in self.values if value is not None}
-        return sorted(known, key=lambda value: (isinstance(value, str), value))
+        """The values that occur: numbers in order, texts in that of the table."""
+        known = dict.fromkeys(value for value in self.values if value is not None)
+        return list(known) if self.numbers is None else [value for _, value in sorted(self._numbered(known))]
+
+    def _numbered(self, known: Mapping[Any, None]) -> list[tuple[float, Any]]:
+        assert self.numbers is not None  # distinct() has looked
+        number = dict(zip(self.values, self.numbers.tolist(), strict=True))
+        return [(number[value], value) for value in known]
 
 
 @dataclass(frozen=True)
@@ -71,8 +73,9 @@ class Campaign:
     axes: Sequence[Column]
     scalars: Sequence[Column]
     versions: Mapping[str, str]
-    text: str  # of the campaign's YAML
+    texts: Mapping[str, str]  # of the campaign's file and of the base scenario's, by their names
     kept: int  # runs with a file of their own
+    hash: str  # of all cases as planned
 
     @property
     def done(self) -> NDArray[np.bool_]:
@@ -87,19 +90,19 @@ class Campaign:
 
 
 def is_campaign(folder: Path) -> bool:
-    """Whether there is a table of cases in the folder."""
-    return (folder / TABLE).is_file()
+    """Whether there is anything of a campaign in the folder."""
+    return any((folder / name).is_file() for name in (TABLE, JOURNAL))
 
 
 def read_campaign(folder: Path) -> Campaign:
-    """The campaign in a folder; GF7002 if its table cannot be read."""
+    """The campaign in a folder; GF7002 if it has no table or one that cannot be read."""
     table = _read(folder / TABLE)
-    text = _text(folder / CAMPAIGN)
-    plain = _tree(text)
     about = _metadata(table)
+    text = str(about.get("campaign") or _text(folder / CAMPAIGN))
+    plain = _tree(text)
     columns = {name: table.column(name).to_pylist() for name in table.column_names}
     rows = table.num_rows
-    axes = [name for name in _axes(about, plain) if name in columns]
+    axes = [str(name) for name in about.get("axes") or () if name in columns]
     units, descriptions = _texts(about.get("units")), _texts(about.get("descriptions"))
     for field in table.schema:
         own = {key.decode(): value.decode() for key, value in (field.metadata or {}).items()}
@@ -110,7 +113,8 @@ def read_campaign(folder: Path) -> Campaign:
         for name, values in columns.items()
         if name not in _FIXED
     }
-    runs = folder / RUNS
+    codes = columns.get("error_code", [None] * rows)
+    errors = columns.get("error", [None] * rows)
     return Campaign(
         folder=folder,
         title=str(about.get("title") or plain.get("name") or folder.resolve().name),
@@ -118,12 +122,16 @@ def read_campaign(folder: Path) -> Campaign:
         planned=max(rows, int(about["cases"]) if isinstance(about.get("cases"), int) else 0),
         cases=[str(case) for case in columns.get("case", range(1, rows + 1))],
         statuses=[str(status) for status in columns.get("status", ["completed"] * rows)],
-        errors=[str(error or "") for error in columns.get("error", columns.get("message", [""] * rows))],
+        errors=[": ".join(str(part) for part in pair if part) for pair in zip(codes, errors, strict=True)],
         axes=[made[name] for name in axes if name in made],
         scalars=[_scaled(column) for name, column in made.items() if name not in axes],
         versions=_texts(about.get("versions")),
-        text=text,
-        kept=sum(1 for _ in runs.glob("*.nc")) if runs.is_dir() else 0,
+        texts={
+            str(about.get("campaign_file") or CAMPAIGN): text,
+            str(about.get("base_file") or "base"): str(about.get("base") or ""),
+        },
+        kept=sum(1 for file in columns.get("result", ()) if file),
+        hash=str(about.get("hash") or ""),
     )
 
 
@@ -131,6 +139,12 @@ def _read(file: Path) -> pa.Table:
     import pyarrow as pa  # a tenth of a second: not for a run
     import pyarrow.parquet as pq
 
+    if not file.is_file():
+        raise GustformError(
+            "GF7002",
+            f"{str(file.parent)!r} must have the table of its campaign; the sweep was cut off before it wrote one",
+            hint="gustform sweep again, which goes on from there",
+        )
     try:
         return pq.read_table(file)
     except (OSError, pa.ArrowException) as error:
@@ -148,19 +162,11 @@ def _metadata(table: pa.Table) -> Mapping[str, Any]:
     return found if isinstance(found, dict) else {}
 
 
-def _axes(about: Mapping[str, Any], plain: Mapping[str, Any]) -> list[str]:
-    """Names of the axes: a list, or the keys of a mapping; of a list of mappings their names."""
-    axes = about.get("axes") or plain.get("axes") or ()
-    return [str(axis.get("name", axis.get("path", ""))) if isinstance(axis, Mapping) else str(axis) for axis in axes]
-
-
 def _column(name: str, values: list[Any], unit: str, description: str) -> Column:
     numbers = _numbers(values)
     if numbers is None and (parsed := _quantities(values)) is not None:
         numbers, unit = parsed[0], unit or parsed[1]
-    if not unit:
-        unit = next((u for suffix, u in _SUFFIXES if name.endswith(suffix)), "")
-    return Column(name, unit, description, values, numbers)
+    return Column(name, "" if unit == "1" else unit, description, values, numbers)
 
 
 def _scaled(column: Column) -> Column:

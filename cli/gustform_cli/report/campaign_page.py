@@ -9,12 +9,13 @@ import numpy as np
 
 from gustform_cli.progress import times
 from gustform_cli.report import campaign_charts, campaign_tables
-from gustform_cli.report.campaign_folder import TABLE, Campaign, read_campaign
+from gustform_cli.report.campaign_folder import TABLE, WEIGHT, Campaign, read_campaign
 from gustform_cli.report.markup import Content, Html, tag
-from gustform_cli.report.numbers import count, duration, fixed, places, pretty, size
+from gustform_cli.report.numbers import count, duration, fixed, many, places, pretty, size
 from gustform_cli.report.page import Head, Section, details, page
 from gustform_cli.report.tables import Figure, facts, key_figures
 
+_NAMES = {"nadir_hz": "Frequency nadir", "settle_hz": "Settling", "rocof_hz_per_s": "RoCoF"}
 _FIGURES = 3  # scalars whose range is among the key figures
 
 
@@ -31,8 +32,12 @@ def _head(campaign: Campaign) -> Head:
     elif done < rows:
         status, state = f"{count(rows - done)} of {count(rows)} cases failed", "bad" if done == 0 else "warn"
     else:
-        status, state = f"all {count(rows)} cases done", "good"
-    facts_line = [f"{len(campaign.axes)} axes", f"{len(campaign.scalars)} scalars", campaign.written]
+        status, state = "all cases done", "good"
+    facts_line = [
+        many(len(campaign_charts.varied(campaign)), "axis", "axes"),
+        many(len(campaign.scalars), "scalar", "scalars"),
+        campaign.written,
+    ]
     return Head("campaign", campaign.title, campaign.description, status, state, facts_line)
 
 
@@ -68,8 +73,9 @@ def _figures(campaign: Campaign) -> list[Figure]:
         low, high = float(known.min()), float(known.max())
         decimals = places(high - low, max(abs(low), abs(high)))
         note = f"mean; {fixed(low, decimals)} … {fixed(high, decimals)}"
-        figures.append(Figure(scalar.name, fixed(float(known.mean()), decimals), pretty(scalar.unit), note))
-    simulated, waited = _total(campaign, "simulated_seconds"), _total(campaign, "wall_seconds")
+        name = next((name for end, name in _NAMES.items() if scalar.name.endswith(end)), scalar.name)
+        figures.append(Figure(name, fixed(float(known.mean()), decimals), pretty(scalar.unit), note))
+    simulated, waited = _total(campaign, "simulated_seconds"), _total(campaign, "solve_seconds")
     if simulated:
         figures.append(Figure("Simulated", duration(simulated)))
     if simulated and waited:
@@ -86,16 +92,18 @@ def _charts(campaign: Campaign) -> Content:
     drawn = campaign_charts.charts(campaign)
     if drawn is None:
         return None
-    seeds = [column for column in campaign.axes if column.name.split(".")[-1] in ("seed", "seeds")]
     note = "Cases that are done. "
-    if seeds:
+    if any(campaign_charts.is_seed(column) for column in campaign.axes):
         note += "Seeds are repetitions: lines and maps are means over them. "
     return [tag("p", note, class_="soft"), drawn]
 
 
 def _statistics(campaign: Campaign) -> Content:
     table = campaign_tables.scalars(campaign)
-    return [tag("p", "Over the cases that are done; std over all of them.", class_="soft"), table] if table else None
+    note = "Over the cases that are done."
+    if any(axis.name == WEIGHT for axis in campaign.axes):
+        note += " By weight: the mean with the share of the time that each case stands for."
+    return [tag("p", note, class_="soft"), table] if table else None
 
 
 def _provenance(campaign: Campaign) -> Html:
@@ -106,7 +114,8 @@ def _provenance(campaign: Campaign) -> Html:
         ("versions", ", ".join(f"{name} {version}" for name, version in campaign.versions.items()) or None),
         ("table", f"{TABLE}, {size(file.stat().st_size)}"),
         ("SHA-256 of the table", tag("code", hashlib.sha256(file.read_bytes()).hexdigest())),
+        ("hash of the cases", tag("code", campaign.hash) if campaign.hash else None),
         ("runs kept", count(campaign.kept) if campaign.kept else None),
     ]
-    text = details("Campaign as it was run", tag("pre", campaign.text)) if campaign.text else None
-    return Html(facts((name, value) for name, value in pairs if value) + (text or ""))
+    texts = [details(f"{name}, as it was read", tag("pre", text)) for name, text in campaign.texts.items() if text]
+    return Html(facts((name, value) for name, value in pairs if value) + "".join(texts))

@@ -7,12 +7,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gustform_cli.report.campaign_folder import Campaign, Column
+from gustform_cli.report.campaign_charts import by_interest, is_outer
+from gustform_cli.report.campaign_folder import WEIGHT, Campaign, Column
 from gustform_cli.report.markup import Content, Html, tag
 from gustform_cli.report.numbers import fixed, places, plain, pretty, significant
+from gustform_cli.report.page import details
 from gustform_cli.report.tables import Cell, table
 
 _LISTED = 8  # values of an axis, cases of a failure
+_MOST_SCALARS = 40  # columns of the table of cases
 _MOST_CELLS = 12_000  # of the table of cases: more make a page that no browser likes
 _NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
 
@@ -21,6 +24,8 @@ def axes(campaign: Campaign) -> Html | None:
     """Each axis with its values."""
     rows: list[list[Cell | str]] = []
     for column in campaign.axes:
+        if column.name == WEIGHT:  # follows from the wind speed
+            continue
         distinct = column.distinct()
         rows.append(
             [
@@ -76,10 +81,23 @@ def _link(campaign: Campaign, k: int) -> Html:
 
 
 def scalars(campaign: Campaign) -> Html | None:
-    """Mean, deviation, median and extremes of every scalar, with the cases of the extremes."""
+    """Mean, deviation, median and extremes of every scalar, with the cases of the extremes.
+
+    What is inside of components and what the computation cost is folded away.
+    """
+    ordered = by_interest(campaign.scalars)
+    outer = _statistics(campaign, [column for column in ordered if is_outer(column)])
+    inner = _statistics(campaign, [column for column in ordered if not is_outer(column)])
+    if outer is None or inner is None:
+        return outer or inner
+    return Html(outer + details("Channels inside of components, and what the computation cost", inner))
+
+
+def _statistics(campaign: Campaign, columns: Sequence[Column]) -> Html | None:
     done = campaign.done
+    weight = next((axis.numbers for axis in campaign.axes if axis.name == WEIGHT), None)
     rows: list[list[Cell | str]] = []
-    for column in campaign.scalars:
+    for column in columns:
         if column.numbers is None:
             continue
         numbers = np.where(done, column.numbers, np.nan)
@@ -88,7 +106,10 @@ def scalars(campaign: Campaign) -> Html | None:
             continue
         decimals = places(float(np.ptp(known)), float(np.abs(known).max()))
         lowest, highest = int(np.nanargmin(numbers)), int(np.nanargmax(numbers))
-        figures = (known.mean(), known.std(), np.percentile(known, 5), np.median(known), np.percentile(known, 95))
+        figures = [known.mean(), known.std(), np.percentile(known, 5), np.median(known), np.percentile(known, 95)]
+        if weight is not None:
+            there = np.isfinite(numbers) & np.isfinite(weight)
+            figures.insert(1, np.average(numbers[there], weights=weight[there]) if weight[there].sum() > 0 else np.nan)
         rows.append(
             [
                 Cell(tag("code", column.name), None),
@@ -104,19 +125,25 @@ def scalars(campaign: Campaign) -> Html | None:
                 ),
             ]
         )
-    heads = ["scalar", "unit", "cases", "mean", "std", "5 %", "median", "95 %", "lowest", "highest"]
+    by_weight = ["by weight"] if weight is not None else []
+    heads = ["scalar", "unit", "cases", "mean", *by_weight, "std", "5 %", "median", "95 %", "lowest", "highest"]
     return table(heads, rows, sortable=True) if rows else None
 
 
 def rows_shown(campaign: Campaign) -> int:
     """How many cases the table of cases has room for."""
-    columns = 2 + len(campaign.axes) + len(campaign.scalars)
-    return min(len(campaign.cases), _MOST_CELLS // columns)
+    return min(len(campaign.cases), _MOST_CELLS // (2 + len(_columns(campaign))))
+
+
+def _columns(campaign: Campaign) -> list[Column]:
+    outer = [column for column in by_interest(campaign.scalars) if is_outer(column)]
+    effort = [column for column in campaign.scalars if column.name.count(".") == 0 and not is_outer(column)]
+    return [*campaign.axes, *[*outer, *effort][:_MOST_SCALARS]]
 
 
 def cases(campaign: Campaign) -> Html | None:
     """All cases with their values, or as many as a page can hold."""
-    columns = [*campaign.axes, *campaign.scalars]
+    columns = _columns(campaign)
     decimals = [_decimals(column) for column in columns]
     rows: list[list[Cell | str]] = [
         [

@@ -20,6 +20,8 @@ Floats = NDArray[np.float64]
 
 COLOURS = 6  # classes c1 ... c6 of the style sheet; more lines begin again
 _LEFT, _RIGHT, _TOP, _BOTTOM = 52.0, 14.0, 10.0, 38.0
+_LETTER = 6.8  # width of one at the size of ticks
+_DOTTED_POINTS = 40  # a line with fewer shows them
 _MOST_POINTS = 900  # of a line: two for each pixel it can have
 _TITLED_POINTS = 400  # of a scatter; more are drawn without their names
 
@@ -92,6 +94,8 @@ def lines(
             drawn.append(tag("path", class_=f"band {colour}", d=frame.outline(x_band, low, high)))
             values = values.mean(axis=1)
         drawn.append(tag("path", class_=f"line {colour}", d=frame.path(*_thin(curve.x, values))))
+        if values.size <= _DOTTED_POINTS:
+            drawn.append(tag("path", class_=f"dots {colour}", d=frame.dots(curve.x, values)))
     drawn += [_mark(frame, mark) for mark in marks]
     named = [curve.label + (f", mean and range of {curve.y.shape[1]}" if curve.y.ndim > 1 else "") for curve in curves]
     ranges = "; ".join(
@@ -134,8 +138,7 @@ def scatter(title: str, x: Axis, y: Axis, clouds: Sequence[Points], trend: Line 
                 for px, py, name in zip(*frame.pixels(cloud.x, cloud.y), cloud.names, strict=True)
             ]
         else:  # one path for all: a tenth of the bytes
-            path = "".join(f"M{px:.1f} {py:.1f}h0" for px, py in zip(*frame.pixels(cloud.x, cloud.y), strict=True))
-            drawn.append(tag("path", class_=f"dots {colour}", d=path))
+            drawn.append(tag("path", class_=f"dots cloud {colour}", d=frame.dots(cloud.x, cloud.y)))
     if trend is not None:
         drawn.append(tag("path", class_="trend", d=frame.path(trend.x, trend.y)))
     legend = [cloud.label for cloud in clouds] if len(clouds) > 1 else []
@@ -166,6 +169,11 @@ class _Frame:
         ends = np.flatnonzero(known & ~np.concatenate([known[1:], [False]])) + 1
         return "".join(f"M{self._joined(x[b:e], y[b:e])}" for b, e in zip(begins, ends, strict=True))
 
+    def dots(self, x: Floats, y: Floats) -> str:
+        """Points as one path of strokes without length, whose ends are round."""
+        known = np.isfinite(x) & np.isfinite(y)
+        return "".join(f"M{px:.1f} {py:.1f}h0" for px, py in zip(*self.pixels(x[known], y[known]), strict=True))
+
     def outline(self, x: Floats, low: Floats, high: Floats) -> str:
         """The area between two lines."""
         known = np.isfinite(low) & np.isfinite(high)
@@ -184,12 +192,21 @@ class _Frame:
             y = self.y(tick)
             drawn.append(tag("path", class_="grid", d=f"M{_LEFT:g} {y:.1f}H{right:g}"))
             drawn.append(tag("text", text, class_="tick", x=_LEFT - 6.0, y=f"{y + 4:.1f}", text_anchor="end"))
-        for tick, text in zip(self._x.ticks, self._x.texts, strict=True):
-            x = self.x(tick)
+        letters = int(2.0 * (right - _LEFT) / max(1, len(self._x.ticks)) / _LETTER)
+        for number, (tick, text) in enumerate(zip(self._x.ticks, self._x.texts, strict=True)):
+            x, y = self.x(tick), bottom + 15.0
             drawn.append(tag("path", class_="grid", d=f"M{x:.1f} {_TOP:g}V{bottom:g}"))
-            drawn.append(tag("text", text, class_="tick", x=f"{x:.1f}", y=bottom + 15.0, text_anchor="middle"))
+            if self._x.texts_are_long:
+                y += 13.0 * (number % 2)
+                text = text if len(text) <= letters else f"{text[: letters - 1]}…"
+                half = 0.5 * _LETTER * len(text)
+                x = min(max(x, half), self.size.width - half)
+            drawn.append(tag("text", text, class_="tick", x=f"{x:.1f}", y=y, text_anchor="middle"))
         drawn.append(tag("path", class_="axis", d=f"M{_LEFT:g} {_TOP:g}V{bottom:g}H{right:g}"))
-        drawn.append(tag("text", self._x.label, class_="label", x=right, y=self.size.height - 6.0, text_anchor="end"))
+        if not self._x.texts_are_long:  # names speak for themselves, and take the room
+            drawn.append(
+                tag("text", self._x.label, class_="label", x=right, y=self.size.height - 6.0, text_anchor="end")
+            )
         return drawn
 
 

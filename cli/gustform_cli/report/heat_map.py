@@ -82,9 +82,9 @@ def heat_map(
                     text_anchor="end",
                 )
             )
-    # Long names stand on two lines in turn; where they do not fit even so, every second, third ... one is written.
+    # Long names stand on two or three lines in turn; where they do not fit even so, every so many is written.
     widest = 6.8 * max(len(text) for text in over) + 6.0
-    lines = 2 if cell_x < widest <= 2.0 * cell_x else 1
+    lines = min(3, max(1, int(np.ceil(widest / cell_x))))
     every = max(1, int(np.ceil(widest / (lines * cell_x))))
     for j in range(0, wide, every):
         x, y = left + (j + 0.5) * cell_x, height + 20.0 + 14.0 * (j // every % lines)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 # Characters that a document must not contain, and surrogates, which no file can be written with.
 _FORBIDDEN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
-_VOID = {"meta", "br", "img"}
+_VOID = {"meta", "wbr"}
 
 
 class Html(str):
@@ -44,3 +44,8 @@ def tag(name: str, /, *content: Content, **attributes: str | float | bool | None
         if value is not None and value is not False
     )
     return Html(f"<{name}{written}>" if name in _VOID else f"<{name}{written}>{join(content)}</{name}>")
+
+
+def breakable(name: str) -> Html:
+    """A name that may be broken behind its dots and underscores."""
+    return Html(tag("wbr").join(escape(part) for part in re.split(r"(?<=[._])", name)))

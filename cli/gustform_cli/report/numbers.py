@@ -68,6 +68,11 @@ def count(value: float) -> str:
     return f"{value:,.0f}".replace(",", "\u202f")
 
 
+def many(number: int, one: str, several: str) -> str:
+    """1 axis, 2 axes."""
+    return f"{count(number)} {one if number == 1 else several}"
+
+
 def duration(seconds: float) -> str:
     """90 s, 10 min, 24 h, 365 d."""
     if seconds < 300.0:

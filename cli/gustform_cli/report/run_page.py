@@ -10,7 +10,7 @@ from gustform.language.errors import GustformError
 from gustform_cli.report import run_charts, run_tables
 from gustform_cli.report.channel_statistics import Moments, moments
 from gustform_cli.report.markup import Content, Html, tag
-from gustform_cli.report.numbers import count, duration, moment
+from gustform_cli.report.numbers import duration, many, moment
 from gustform_cli.report.page import Head, Section, page
 from gustform_cli.report.run_figures import key_numbers
 from gustform_cli.report.run_folder import RunFolder, read_run
@@ -36,9 +36,9 @@ def _head(run: RunFolder, file: h5py.File | None) -> Head:
         facts.append(f"{duration(float(simulated))} simulated")
     entries = run.plain.get("components")
     if entries:
-        facts.append(f"{len(entries)} components")
+        facts.append(many(len(entries), "component", "components"))
     if file is not None and "time" in file:
-        facts.append(f"{count(file['time'].shape[0])} rows")
+        facts.append(many(file["time"].shape[0], "row", "rows"))
     facts.append(run.written)
     return Head(
         "run",
@@ -84,7 +84,11 @@ def _moments(file: h5py.File) -> dict[str, Moments]:
     return {
         name: moments(data, file["time"])
         for name, data in file.items()
-        if name != "time" and data.ndim and data.shape[0] == rows and "units" in data.attrs
+        if isinstance(data, h5py.Dataset)  # statistics are a group
+        and name != "time"
+        and data.ndim
+        and data.shape[0] == rows
+        and "units" in data.attrs
     }
 
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from gustform_cli.report.markup import Content, Html, tag
+from gustform_cli.report.markup import Content, Html, breakable, tag
 
 _TALL = 40  # rows; a longer table scrolls in a box
 
@@ -62,7 +62,7 @@ def key_figures(figures: Sequence[Figure]) -> Html:
         [
             tag(
                 "div",
-                tag("span", figure.name, class_="name"),
+                tag("span", breakable(figure.name), class_="name"),
                 tag("span", figure.value, tag("small", figure.unit) if figure.unit else None, class_="value"),
                 tag("span", figure.note, class_="hint") if figure.note else None,
                 class_="figure",

@@ -38,7 +38,7 @@ def assert_harmless(page: Page) -> None:
         "html", "head", "meta", "title", "style", "body", "header", "p", "h1", "h2", "h3", "span", "nav", "a", "main",
         "section", "div", "small", "figure", "figcaption", "b", "i", "svg", "path", "rect", "circle", "text", "table",
         "thead", "tbody", "tr", "th", "td", "code", "ul", "li", "dl", "dt", "dd", "details", "summary", "pre", "footer",
-        "script",
+        "script", "wbr",
     }  # fmt: skip
     assert all(address.startswith("#") for address in page.addresses())
 

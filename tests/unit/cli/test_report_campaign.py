@@ -65,7 +65,7 @@ def test_the_page_says_what_was_varied_and_what_came_out(tmp_path: Path) -> None
     assert done.stdout.strip() == str(tmp_path / "report.html")
     page = page_of(tmp_path)
     assert_harmless(page)
-    for text in ("Nadir over wind and curtailment", "A load step.", "all 6 cases done", "6, 8, 10", "gustform 0.1.0"):
+    for text in ("Nadir over wind and curtailment", "A load step.", "all cases done", "6, 8, 10", "gustform 0.1.0"):
         assert text in page.text
     # 49 + 0.01 wind + 0.02 curtailment + 0.001: mean, lowest and highest case
     for value in (49.181, 49.061, 49.301):
@@ -153,11 +153,70 @@ def test_axes_may_be_texts_or_quantities(tmp_path: Path) -> None:
     assert "Matching" in page.texts  # in the map
 
 
-def test_axes_are_found_in_the_campaign_beside_the_table(tmp_path: Path) -> None:
-    write_table(tmp_path, grid(), {}, "name: From YAML\naxes:\n  wind.wt.speed: [6 m/s, 8 m/s, 10 m/s]\n")
+def test_a_table_without_metadata_gives_its_statistics(tmp_path: Path) -> None:
+    write_table(tmp_path, grid(), {}, "name: From YAML\n")
     page = page_of(tmp_path)
     assert "From YAML" in page.text
-    assert "over wind.wt.speed" in " ".join(labels(page))
+    assert "What was varied" not in page.text
+    assert any(number == pytest.approx(49.181) for number in page.numbers)
+
+
+def test_axes_of_a_list_are_one(tmp_path: Path) -> None:
+    rows = [
+        {"case": k, "a": 2.0 * k, "b": f"b{k}", "weight": 0.1 * k, "seed_number": 1, "nadir_hz": 49.0 + k,
+         "status": "completed"}
+        for k in (1, 2, 3) for _ in range(2)
+    ]  # fmt: skip
+    write_table(tmp_path, rows, {"axes": ["a", "b", "weight", "seed_number"]})
+    page = page_of(tmp_path)
+    assert labels(page) == ["nadir_hz over a, 6 cases, from 50 to 52, rank correlation 1"]
+    # 50, 51, 52 with weights 1, 2, 3: 308/6
+    assert any(number == pytest.approx(308.0 / 6.0) for number in page.numbers)
+    assert "1 axis" in page.text
+
+
+def test_what_is_inside_and_what_it_cost_is_folded_away(tmp_path: Path) -> None:
+    rows = [
+        {"case": k, "a": float(k), "frequency.nadir_hz": 49.0 + k, "wt.P.mean": 1e6 * k,
+         "wt.control.gsc.xi.mean": 1.0 * k,
+         "wt.omega_del.mean": 1.0 + k, "steps": 100.0 + k, "solve_seconds": 0.1, "simulated_seconds": 90.0,
+         "status": "completed"}
+        for k in range(1, 4)
+    ]  # fmt: skip
+    write_table(tmp_path, rows, {"axes": ["a"], "units": {"wt.P.mean": "W", "steps": "1"}})
+    page = page_of(tmp_path)
+    # The nadir first; a reference speed is no damage-equivalent load; neither steps nor inner channels are drawn.
+    assert [label.split(" over")[0] for label in labels(page)] == [
+        "frequency.nadir_hz",
+        "wt.P.mean",
+        "wt.omega_del.mean",
+    ]
+    assert "Channels inside of components, and what the computation cost" in page.text
+    assert "wt.control.gsc.xi.mean" in page.text
+    assert "Frequency nadir" in page.text
+    assert "270 s" in page.text or "4.5 min" in page.text
+    assert any(number == pytest.approx(102.0) for number in page.numbers)
+
+
+def test_errors_have_their_codes_and_kept_runs_are_counted(tmp_path: Path) -> None:
+    rows = grid()
+    for row in rows:
+        row.update(error_code=None, result=None)
+    rows[2].update(status="failed", error_code="GF6301", error="the step became too small", result="runs/ab.nc")
+    write_table(tmp_path, rows, {**ABOUT, "hash": "abc123", "campaign": "name: c", "base": "name: b"})
+    page = page_of(tmp_path)
+    assert "GF6301: the step became too small" in page.text
+    assert "runs/ab.nc" not in page.text
+    assert "runs kept" in page.text
+    assert {"abc123", "name: c", "name: b"} <= set(page.texts)
+
+
+def test_a_sweep_that_was_cut_off_before_its_table_is_told_how_to_go_on(tmp_path: Path) -> None:
+    (tmp_path / "journal.jsonl").write_text("")
+    refused = gustform("report", tmp_path)
+    assert refused.exit_code == 2
+    assert "GF7002" in refused.stderr
+    assert "gustform sweep again" in refused.stderr
 
 
 def test_a_campaign_that_goes_on_says_how_far_it_is(tmp_path: Path) -> None:
