@@ -80,7 +80,7 @@ class Document:
         tree = copy.deepcopy(self.tree)
         overridden = dict(self.overridden)
         for change in changes:
-            for path in _apply(tree, change):
+            for path in put(tree, change):
                 overridden[path] = change.place
         return Document(self.file, tree, overridden)
 
@@ -149,35 +149,35 @@ def dotted(path: Iterable[str | int]) -> str:
     return text or "the scenario"
 
 
-def read(file: Path, overrides: Sequence[str] = ()) -> Document:
-    """The document in `file` with overrides applied. Raises GF2101 (unreadable), GF2102, GF2103, GF2104, GF2105."""
+def read(file: Path, overrides: Sequence[str] = (), what: str = "scenario") -> Document:
+    """The document in `file`, a `what`, with overrides applied. Raises GF2101 (unreadable) to GF2105."""
     try:
         text = file.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
         raise GustformError(
             "GF2101",
-            f"the scenario must be UTF-8 text; byte {error.start} is not",
+            f"the {what} must be UTF-8 text; byte {error.start} is not",
             hint="saving it as UTF-8",
             place=Place(str(file)),
         ) from None
     except OSError as error:
         raise GustformError(
             "GF2101",
-            f"the scenario must be a readable file; got: {error.strerror or error}",
-            hint="gustform new FILE, which writes one to start from",
+            f"the {what} must be a readable file; got: {error.strerror or error}",
+            hint="gustform new FILE, which writes one to start from" if what == "scenario" else "the path of a file",
             place=Place(str(file)),
         ) from None
-    return parse(text, str(file), overrides)
+    return parse(text, str(file), overrides, what)
 
 
-def parse(text: str, file: str, overrides: Sequence[str] = ()) -> Document:
+def parse(text: str, file: str, overrides: Sequence[str] = (), what: str = "scenario") -> Document:
     """The document written in `text`; `file` is the name used in errors."""
     tree = _load(text, file)
     if not isinstance(tree, CommentedMap):
         got = "nothing" if tree is None else "a list" if isinstance(tree, list) else "a single value"
         raise GustformError(
             "GF2104",
-            f"the scenario must be a mapping of keys (name, components, run, ...); got {got}",
+            f"the {what} must be a mapping of keys; got {got}",
             hint="gustform new FILE, which writes one to start from",
             place=Place(file, 1, 1),
         )
@@ -228,8 +228,8 @@ def _from_text(override: str) -> Change:
     return Change(name.strip(), _load(text, str(place)) if text.strip() else None, place)
 
 
-def _apply(tree: CommentedMap, change: Change) -> list[NodePath]:
-    """Set one path of the tree; returns the path, and those of mappings it had to begin.
+def put(tree: dict[str, Any], change: Change) -> list[NodePath]:
+    """Set one path of a tree, a document's or a plain one; returns the path, and those of mappings it had to begin.
 
     A first key that is no top-level key but a component's name is looked up among the components, as in events
     (`load.active`).
@@ -237,19 +237,19 @@ def _apply(tree: CommentedMap, change: Change) -> list[NodePath]:
     name, value, place = change.path, change.value, change.place
     keys = name.replace("[", ".").replace("]", "").split(".")
     components = tree.get("components")
-    if keys[0] not in tree and isinstance(components, CommentedMap) and keys[0] in components:
+    if keys[0] not in tree and isinstance(components, dict) and keys[0] in components:
         keys.insert(0, "components")
     node: Any = tree
     path: list[str | int] = []
     begun: list[NodePath] = []
     for depth, step in enumerate(keys):
         last = depth == len(keys) - 1
-        if isinstance(node, CommentedMap):
+        if isinstance(node, dict):
             if not last and step not in node:
                 # A mapping that may be left out is begun by its first key: output.every, wt.control.K_gsc. If it may
                 # not be there at all, the check of the whole says so. A new component is more than one value.
                 if (depth == 0 and len(keys) == 2) or (depth >= 2 and keys[0] == "components"):
-                    node[step] = CommentedMap()
+                    node[step] = type(node)()
                     begun.append((*path, step))
                 else:
                     raise GustformError(
@@ -263,7 +263,7 @@ def _apply(tree: CommentedMap, change: Change) -> list[NodePath]:
                 node[step] = value
             else:
                 node = node[step]
-        elif isinstance(node, CommentedSeq):
+        elif isinstance(node, list):
             if not step.isdigit() or int(step) >= len(node):
                 raise GustformError(
                     "GF2105",

@@ -1,4 +1,4 @@
-"""The command `gustform`: simulate, check, linearise, design, study, info, plot, report, new.
+"""The command `gustform`: simulate, check, sweep, linearise, design, study, info, plot, report, new.
 
 Only what a command needs is loaded when it runs; `gustform --help` loads none of it. Exit codes: 0 done, 1 the model
 or the run failed, 2 usage or scenario, 130 interrupted.
@@ -84,6 +84,36 @@ def check(
             from gustform_cli.model_file import write_model
 
             write_model(model, model_file)
+
+
+@app.command()
+def sweep(
+    campaign: Annotated[Path, typer.Argument(metavar="CAMPAIGN.yaml", help="campaign file")],
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="folder of the results [results/NAME]")] = None,
+    workers: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="processes on this machine [all its cores]")
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="run on a cluster: tcp://host:8786 of a dask scheduler"),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Run the cases of a campaign that are missing or failed; writes scalars.parquet and, where wanted, runs/*.nc."""
+    from gustform_cli.interrupt import Interrupt
+
+    with Interrupt() as interrupt, guarded():
+        from gustform_cli.sweep import closing
+        from gustform_cli.sweep.execute import sweep as run
+        from gustform_cli.sweep.local import cores
+
+        folder = out if out is not None else Path("results") / campaign.stem
+        swept = run(campaign, folder, workers or cores(), scheduler, interrupt)
+        for line in closing.failure_lines(swept):
+            print(line, file=sys.stderr)
+        print(closing.as_json(swept) if json else closing.as_text(swept))
+    codes = {"completed": DONE, "interrupted": INTERRUPTED}
+    raise typer.Exit(codes.get(closing.status(swept), FAILED))
 
 
 @app.command()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from types import TracebackType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
@@ -18,8 +18,16 @@ def times(factor: float) -> str:
     return f"{factor:.3g}" if factor < 1000.0 else f"{float(f'{factor:.3g}'):.0f}"
 
 
+def clock(seconds: float) -> str:
+    """A time as people read it: 0:07, 12:30, 1:02:03."""
+    hours, rest = divmod(round(seconds), 3600)
+    return f"{hours}:{rest // 60:02d}:{rest % 60:02d}" if hours else f"{rest // 60}:{rest % 60:02d}"
+
+
 class RunProgress:
     """Shows simulated time, real-time factor and time left. Use as a context; `show` at any rate."""
+
+    doing = "simulating"
 
     def __init__(self, until: float) -> None:
         self.until = until
@@ -28,14 +36,14 @@ class RunProgress:
         self._bar: Progress | None = None
         self._task: TaskID | None = None
 
-    def __enter__(self) -> RunProgress:
+    def __enter__(self) -> Self:
         if sys.stderr.isatty():
             # Loaded here only: a run into a log file does without.
             from rich.console import Console
             from rich.progress import BarColumn, Progress, TextColumn
 
             self._bar = Progress(
-                TextColumn("simulating"),
+                TextColumn(self.doing),
                 BarColumn(bar_width=None),
                 TextColumn("{task.fields[state]}"),
                 console=Console(stderr=True),
@@ -59,15 +67,12 @@ class RunProgress:
             self._bar.update(self._task, completed=simulated, state=text)
         elif now - self._last_line >= _LINE_EVERY:
             self._last_line = now
-            print(f"simulating: {text}", file=sys.stderr, flush=True)
+            print(f"{self.doing}: {text}", file=sys.stderr, flush=True)
 
     def state(self, simulated: float, waited: float) -> str:
         """ "12.0 / 90.0 s, 340 x real time, 0:02 left"."""
         text = f"{simulated:.1f} / {self.until:.1f} s"
         if simulated > 0.0 and waited > 0.0:
             factor = simulated / waited
-            left = (self.until - simulated) / factor
-            hours, rest = divmod(round(left), 3600)
-            clock = f"{hours}:{rest // 60:02d}:{rest % 60:02d}" if hours else f"{rest // 60}:{rest % 60:02d}"
-            text += f", {times(factor)} x real time, {clock} left"
+            text += f", {times(factor)} x real time, {clock((self.until - simulated) / factor)} left"
         return text

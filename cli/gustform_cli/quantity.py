@@ -74,6 +74,14 @@ def conversion(unit: str, declared: str) -> float | None:
     return given / wanted
 
 
+def split_quantity(value: object) -> tuple[float, str] | None:
+    """A number and its unit as they are written, "" without one; None for what is no quantity."""
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return float(value), ""
+    match = _QUANTITY.fullmatch(value) if isinstance(value, str) else None
+    return (float(match["number"]), match["unit"]) if match is not None else None
+
+
 def parse_quantity(value: object, declared: str, path: str, description: str = "") -> float:
     """`value` as a number in the unit `declared`; `path` and `description` name it in errors.
 

@@ -8,7 +8,7 @@ finds, each with its place in the file.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, StrictInt, StrictStr, ValidationError
 from pydantic_core import ErrorDetails
@@ -18,6 +18,8 @@ from gustform_cli.document import Document, NodePath, dotted
 from gustform_cli.errors import did_you_mean
 from gustform_cli.fields import Block, Duration, Many, Moment, Name, Tolerance, shown
 from gustform_cli.wind.blocks import WindBlock
+
+M = TypeVar("M", bound=BaseModel)
 
 
 class ComponentEntry(BaseModel):
@@ -91,14 +93,21 @@ class Scenario(Block):
 # ---- validation with places -----------------------------------------------------------------------------------------
 def validate(document: Document) -> tuple[Scenario | None, list[GustformError]]:
     """The scenario in a document, or None and all that is wrong with its fixed part."""
+    return validate_as(Scenario, document, "{type: constant, speed: 8 m/s}")
+
+
+def validate_as(model: type[M], document: Document, typed: str) -> tuple[M | None, list[GustformError]]:
+    """A document as `model`, or None and all that is wrong with it. `typed` is an example of a mapping that has to say
+    its type."""
     try:
         plain = document.plain()
     except GustformError as error:
         return None, [error]
     try:
-        return Scenario.model_validate(plain), []
+        return model.model_validate(plain), []
     except ValidationError as error:
-        return None, [_translate(document, plain, details) for details in error.errors(include_url=False)]
+        found = error.errors(include_url=False)
+        return None, [_translate(document, plain, details, model, typed) for details in found]
 
 
 def _node_path(plain: Mapping[str, Any], loc: Iterable[str | int]) -> NodePath:
@@ -117,9 +126,9 @@ def _node_path(plain: Mapping[str, Any], loc: Iterable[str | int]) -> NodePath:
     return tuple(path)
 
 
-def _model_at(loc: tuple[str | int, ...]) -> type[BaseModel] | None:
+def _model_at(root: type[BaseModel], loc: tuple[str | int, ...]) -> type[BaseModel] | None:
     """The model whose keys stand at a location of pydantic's."""
-    kind: Any = Scenario
+    kind: Any = root
     for step in loc:
         if isinstance(kind, type) and issubclass(kind, BaseModel):
             fields = {field.alias or name: field.annotation for name, field in kind.model_fields.items()}
@@ -153,7 +162,9 @@ _SHAPES = {
 }
 
 
-def _translate(document: Document, plain: Mapping[str, Any], details: ErrorDetails) -> GustformError:
+def _translate(
+    document: Document, plain: Mapping[str, Any], details: ErrorDetails, root: type[BaseModel], typed: str
+) -> GustformError:
     """One of pydantic's errors in our words."""
     kind, loc, context = details["type"], details["loc"], details.get("ctx", {})
     path = _node_path(plain, loc)
@@ -168,7 +179,7 @@ def _translate(document: Document, plain: Mapping[str, Any], details: ErrorDetai
             place=document.place(path, key=key),
         )
     if kind == "extra_forbidden":
-        model = _model_at(loc[:-1])
+        model = _model_at(root, loc[:-1])
         known = [field.alias or key for key, field in model.model_fields.items()] if model else []
         return GustformError(
             "GF2201",
@@ -186,7 +197,7 @@ def _translate(document: Document, plain: Mapping[str, Any], details: ErrorDetai
             f"{name}.type must be given; it is missing"
             if isinstance(details["input"], dict)
             else f"{name} must be a mapping with a type; got {got}",
-            hint="{type: constant, speed: 8 m/s}",
+            hint=typed,
             place=place,
         )
     if kind == "union_tag_invalid":

@@ -24,7 +24,7 @@ FILE = Path(__file__).with_name("scenario.schema.json")
 
 def scenario_schema() -> dict[str, Any]:
     """The schema as a JSON object (draft 2020-12)."""
-    fixed = _tidy(Scenario.model_json_schema(by_alias=True))
+    fixed = tidy(Scenario.model_json_schema(by_alias=True))
     definitions: dict[str, Any] = fixed.pop("$defs")
     placing = definitions.pop("ComponentEntry")["properties"]
     definitions["quantity"] = {"type": "string", "pattern": QUANTITY_PATTERN}
@@ -45,14 +45,14 @@ def scenario_schema() -> dict[str, Any]:
     }
 
 
-def _tidy(node: Any) -> Any:
+def tidy(node: Any) -> Any:
     """pydantic's schema without titles, nulls for what may be left out, and defaults that are numbers in SI where
     the file has text with a unit."""
     if isinstance(node, list):
-        return [_tidy(item) for item in node]
+        return [tidy(item) for item in node]
     if not isinstance(node, dict):
         return node
-    result = {key: _tidy(value) for key, value in node.items() if not (key == "title" and isinstance(value, str))}
+    result = {key: tidy(value) for key, value in node.items() if not (key == "title" and isinstance(value, str))}
     options = [option for option in result.get("anyOf", []) if option != {"type": "null"}]
     if len(options) == 1:
         del result["anyOf"]

@@ -28,6 +28,7 @@ _MORE = (
     "initial_iterations",
     "rows",
 )
+SOLVER_FIGURES = (*_COUNTERS, *_MORE)
 
 
 def write_summary(summary: Summary, folder: Path) -> Path:
