@@ -2,61 +2,25 @@
 
 from __future__ import annotations
 
-from gustform.language import Component, Input, Output, Parameter, Variable
+from typing import Any
+
+from gustform.control.dual_port_side import DualPortSide
+from gustform.language import Parameter
 
 
-class DualPortGsc(Component):
-    """Frequency from the DC voltage, voltage from the reactive power.
+class DualPortGsc(DualPortSide):
+    """Grid-side frequency from the DC voltage, voltage from the reactive power.
 
         omega = omega_0 + (K_theta + K_d s)/(T_dc s + 1) (v_dc - v_dc*)
         V     = V* + K_q (Q* - Q/(T_v s + 1))
 
-    with one state for each filter, xi for the first:
-
-        T_dc d(xi)/dt = (v_dc - v_dc*) - xi
-        omega = omega_0 + K_theta xi + K_d d(xi)/dt
-        T_v d(Q_f)/dt = Q - Q_f
-
-    `lossless`, the form of the paper's analysis: T_dc = 0 and a constant voltage, so that no state is left:
-
-        omega = omega_0 + K_theta (v_dc - v_dc*) + K_d d(v_dc)/dt          V = V*
-
-    pu: base f0, nominal voltages, rating of the turbine; time in s; Q delivered. Q* is found at a steady-state start so
-    that V = V*. Stable for T_dc < K_d/K_theta only (project notes): the published T_dc = 0.05 s is not.
-    Source: Lyu, Subotic, Gross 2022, eqs. (7), (8); V-A for the analysis.
+    States and the `lossless` form: DualPortSide. pu: base f0, nominal voltages, rating of the turbine; time in s;
+    Q delivered. Q* is found at a steady-state start so that V = V*.
+    Source: Lyu, Subotic, Gross 2022, eqs. (7), (8).
     """
 
-    lossless = Parameter(
-        "1", "the paper's analysis: no filter of the DC voltage, constant AC voltage", default=False, structural=True
-    )
     omega_0 = Parameter("pu", "nominal frequency", default=1.0, above=0.0)
-    K_theta = Parameter("pu", "droop of the frequency with the DC voltage", default=0.5, above=0.0)
-    K_d = Parameter("s", "derivative gain, pu frequency for 1 pu/s of DC voltage", default=0.0067, min=0.0)
-    T_dc = Parameter("s", "time constant of the filter of the DC voltage", default=0.002, above=0.0)
-    K_q = Parameter("pu", "droop of the voltage with the reactive power", default=0.02, min=0.0)
-    T_v = Parameter("s", "time constant of the filter of the reactive power", default=0.05, above=0.0)
-    v_dc_ref = Parameter("pu", "DC voltage set point v_dc*", default=1.0, above=0.0)
-    V_ref = Parameter("pu", "voltage set point V*", default=1.0, above=0.0)
     Q_ref = Parameter("pu", "reactive power set point Q*, found at the start", free=True, start=0.0)
 
-    v_dc = Input("pu", "DC voltage", start=1.0)
-    dv_dc = Input("1/s", "rate of change of the DC voltage in pu/s, read by the lossless form only")
-    Q = Input("pu", "reactive power delivered")
-    omega = Output("pu", "frequency of the converter's voltage", start=1.0)
-    V = Output("pu", "magnitude of the converter's voltage", start=1.0)
-    xi = Variable("pu", "filtered deviation of the DC voltage")
-    Q_filtered = Variable("pu", "filtered reactive power Q_f")
-
-    def equations(self) -> None:
-        if self.lossless:
-            slope = self.dv_dc
-            self.eq(self.xi, self.v_dc - self.v_dc_ref)
-            self.eq(self.Q_filtered, self.Q)
-            self.eq(self.V, self.V_ref)
-        else:
-            slope = (self.v_dc - self.v_dc_ref - self.xi) / self.T_dc
-            self.eq(self.der(self.xi), slope)
-            self.eq(self.T_v * self.der(self.Q_filtered), self.Q - self.Q_filtered)
-            self.eq(self.V, self.V_ref + self.K_q * (self.Q_ref - self.Q_filtered))
-        self.eq(self.omega, self.omega_0 + self.K_theta * self.xi + self.K_d * slope)
-        self.initial(self.Q, self.Q_ref)
+    def omega_ref(self) -> Any:
+        return self.omega_0
