@@ -112,7 +112,7 @@ def charts(campaign: Campaign) -> Content:
         # Names go up, where there is room for them, and are told apart by colour.
         up, across = sorted(over, key=lambda place: (place.column.numbers is not None, place.distinct.size))
         maps = [_map(campaign, scalar, across, up) for scalar in shown]
-        parts: list[Content] = [tag("div", maps, class_="charts")]
+        parts: list[Content] = [tag("div", maps, class_="charts maps")]
         if up.distinct.size <= COLOURS:
             families = [_family(campaign, scalar, across, up) for scalar in shown]
             parts.append(tag("div", families, class_="charts small"))
@@ -292,4 +292,4 @@ def _correlation_map(scalars: Sequence[Column], over: Sequence[_Places], ranks: 
         BLUE_RED,
         (-1.0, 1.0),
     )
-    return tag("div", chart, class_="charts one")
+    return tag("div", chart, class_="charts maps one")

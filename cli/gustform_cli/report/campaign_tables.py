@@ -45,7 +45,7 @@ def _values(column: Column, distinct: Sequence[object]) -> str:
         return ", ".join(plain(value) for value in distinct)
     if column.numbers is not None:
         low, high = float(np.nanmin(column.numbers)), float(np.nanmax(column.numbers))
-        return f"{significant(low)} … {significant(high)}"
+        return f"{significant(low)}\u00a0…\u00a0{significant(high)}"
     return ", ".join(str(value) for value in distinct[:_LISTED]) + ", …"
 
 

@@ -68,8 +68,11 @@ def turbulence(file: h5py.File, found: dict[str, Moments], run: RunFolder) -> Co
             class_="charts small",
         ),
     ]
+    made = {name: own for name, _ in chosen if (own := _made_while_running(file, name)) is not None}
     if every is not None and segment >= 64:
-        densities = [_density(file[name], every, segment, title, name) for name, title in chosen]
+        made = {name: spectrum(file[name], every, segment) for name, _ in chosen if name not in made} | made
+    if made:
+        densities = [_density(file[name], *made[name], title, name) for name, title in chosen if name in made]
         parts += [tag("h3", "Spectral densities"), tag("div", densities, class_="charts small")]
     return parts
 
@@ -129,9 +132,21 @@ def _distribution(data: h5py.Dataset, moments: Moments, title: str, name: str) -
     return bars(title, across, up, edges, percent, alt)
 
 
-def _density(data: h5py.Dataset, every: float, segment: int, title: str, name: str) -> Html:
+def _made_while_running(file: h5py.File, name: str) -> tuple[Floats, Floats] | None:
+    """The spectrum that the run made of every sample, if it did: better than one of stored rows."""
+    group = file.get("statistics")
+    if not isinstance(group, h5py.Group) or not {"channel", "frequency", "psd"} <= set(group):
+        return None
+    names = [str(text) for text in group["channel"].asstr()[:]]
+    if name not in names:
+        return None
+    density = np.asarray(group["psd"][names.index(name)], np.float64)
+    return (np.asarray(group["frequency"], np.float64), density) if density.max() > 0.0 else None
+
+
+def _density(data: h5py.Dataset, frequency: Floats, density: Floats, title: str, name: str) -> Html:
     unit = pretty(str(data.attrs.get("units", "")))
-    frequency, density = octaves(*spectrum(data, every, segment))
+    frequency, density = octaves(frequency, density)
     # float32 rows end eight decades below their size; what is drawn beyond twelve is their rounding.
     seen = density > 1e-12 * density.max()
     frequency, density = frequency[seen], density[seen]

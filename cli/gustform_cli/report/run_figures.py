@@ -12,6 +12,7 @@ from gustform_cli.progress import times
 from gustform_cli.report.channel_statistics import Moments, turbulent
 from gustform_cli.report.numbers import duration, moment, significant
 from gustform_cli.report.run_folder import RunFolder
+from gustform_cli.report.run_statistics import ENERGY
 from gustform_cli.report.tables import Figure
 
 _TURBINES = 3  # with figures of their own; the table of channels has all
@@ -24,7 +25,7 @@ def key_numbers(run: RunFolder, file: h5py.File | None, found: Mapping[str, Mome
     if file is not None and "time" in file and file["time"].shape[0] > 1:
         span = float(file["time"][-1] - file["time"][0])
         for name in _turbines(found)[:_TURBINES]:
-            figures += _turbine(name, file, found, span)
+            figures += _turbine(run, name, file, found, span)
     figures += _computation(run)
     return figures
 
@@ -49,7 +50,7 @@ def _turbines(found: Mapping[str, Moments]) -> list[str]:
     return [name.removesuffix(".wind") for name in found if name.endswith(".wind") and name.count(".") == 1]
 
 
-def _turbine(name: str, file: h5py.File, found: Mapping[str, Moments], span: float) -> Iterator[Figure]:
+def _turbine(run: RunFolder, name: str, file: h5py.File, found: Mapping[str, Moments], span: float) -> Iterator[Figure]:
     wind = found[f"{name}.wind"]
     if turbulent(file[f"{name}.wind"]):
         note = f"turbulence intensity {100 * wind.std / wind.mean:.1f} %"
@@ -58,13 +59,19 @@ def _turbine(name: str, file: h5py.File, found: Mapping[str, Moments], span: flo
     else:
         note = "constant"
     yield Figure(f"Wind of {name}", significant(wind.mean, 3), "m/s", note)
+    # What the run computed from every sample is better than what the stored rows give.
+    energy = (run.summary.get(ENERGY) or {}).get(name) or {}
+    mean, whole, factor = (energy.get(key) for key in ("mean_power_mw", "energy_mwh", "capacity_factor"))
     power, per_unit = found.get(f"{name}.P"), found.get(f"{name}.P_gsc")
-    if power is not None:
-        megawatt_hours = power.integral / _JOULES_PER_WH / 1e6
-        note = f"{significant(power.integral / span / 1e6)} MW in the mean"
-        yield Figure(f"Energy of {name}", significant(megawatt_hours), "MWh", note)
-    if per_unit is not None:
-        yield Figure("Capacity factor", f"{per_unit.mean:.3f}", "", f"mean power over rating of {name}")
+    if whole is None and power is not None:
+        mean, whole = power.integral / span / 1e6, power.integral / _JOULES_PER_WH / 1e6
+    if factor is None and per_unit is not None:
+        factor = per_unit.mean
+    if whole is not None:
+        note = f"{significant(mean)} MW in the mean" if mean is not None else ""
+        yield Figure(f"Energy of {name}", significant(whole), "MWh", note)
+    if factor is not None:
+        yield Figure("Capacity factor", f"{factor:.3f}", "", f"mean power over rating of {name}")
 
 
 def _computation(run: RunFolder) -> Iterator[Figure]:

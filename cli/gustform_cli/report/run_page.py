@@ -14,6 +14,7 @@ from gustform_cli.report.numbers import duration, many, moment
 from gustform_cli.report.page import Head, Section, page
 from gustform_cli.report.run_figures import key_numbers
 from gustform_cli.report.run_folder import RunFolder, read_run
+from gustform_cli.report.run_statistics import computed
 from gustform_cli.report.tables import key_figures
 from gustform_cli.run_data import RunData
 
@@ -69,6 +70,7 @@ def _sections(run: RunFolder, file: h5py.File | None) -> list[Section]:
                 run_tables.components(plain), run_tables.wind(plain), run_tables.events(run), run_tables.settings(plain)
             ),
         ),
+        Section("computed", "Computed while running", computed(run)),
         Section("turbulence", "Distributions and spectra", _turbulence(run, file, found)),
         Section("channels", "Channels", _channels(file, found)),
         Section("solver", "Solver", run_tables.solver(run.summary)),

@@ -238,3 +238,47 @@ def test_the_scenario_of_the_fixture_is_shown(tmp_path: Path) -> None:
     assert "control.K_p" in page.text
     assert "PmsgTurbine, aggregate 10" in page.text
     assert "1e-6" in page.text
+
+
+# ---- what a run computed while it went on ---------------------------------------------------------------------------
+def test_statistics_of_the_run_are_shown(tmp_path: Path) -> None:
+    write_result(tmp_path / "result.nc", np.linspace(0, 10, 101), {**rows(), "wt.P": ("W", np.full(101, 1e6))})
+    moments = {"unit": "W", "mean": 2.5e7, "std": 1.5e6, "min": 2e7, "max": 3e7, "min_time_s": 3.0, "max_time_s": 9.5,
+               "samples": 2001, "damage_equivalent_load": {"4": 7.25e6, "10": 9.5e6}, "cycles": 12.5}  # fmt: skip
+    write_summary(
+        tmp_path,
+        statistics={"wt.P": moments, "wt.control.gsc.xi": {"unit": "pu", "mean": None, "not_finite": 3}},
+        energy={"wt": {"energy_mwh": 0.0694, "mean_power_mw": 25.0, "capacity_factor": 0.5, "reserve_least_mw": -1.5}},
+        limits={"wt": {"P_max": {"seconds": 2.5, "share": 0.25, "when": "power above 0.999 pu"},
+                       "omega_max": {"seconds": 0.0, "share": 0.0, "when": "speed above 1.199 pu"}}},
+        grid_events=[{"at_s": 3.0, "set": {"load.active": "120 MW"}, "nadir_hz": 49.7125, "nadir_time_s": 4.5,
+                      "rocof_hz_per_s": None, "settle_hz": 49.875, "settling_time_s": 5.25}],
+    )  # fmt: skip
+    page = page_of(tmp_path)
+    assert_harmless(page)
+    # Energy by the run, not 1 MW from the rows.
+    assert "0.0694" in page.text
+    assert "25 MW in the mean" in page.text
+    for value in (2.5e7, 1.5e6, 7.25e6, 9.5e6, 2001.0, -1.5, 2.5, 0.25, 49.7125, 49.875, 5.25, 9.5):
+        assert value in page.numbers
+    for text in ("DEL, m = 10", "25 %", "never", "power above 0.999 pu", "3 samples were no numbers"):
+        assert text in page.text
+
+
+def test_a_spectrum_of_the_run_goes_before_one_of_its_rows(tmp_path: Path) -> None:
+    time = np.linspace(0.0, 100.0, 2001)
+    noise = np.random.default_rng(1).standard_normal(2001)
+    file = write_result(tmp_path / "result.nc", time, {"wt.wind": ("m/s", 10.0 + noise)})
+    of_rows = page_of(tmp_path)
+    with h5py.File(file, "a") as result:
+        group = result.create_group("statistics")
+        group.create_dataset("channel", data=np.array(["wt.wind"], dtype=object), dtype=h5py.string_dtype())
+        group["frequency"] = np.linspace(0.0, 1.0, 65)
+        group["psd"] = np.full((1, 65), 12345.0)
+    of_run = page_of(tmp_path)
+    (drawn,) = [
+        a["aria-label"] or "" for t, a in of_run.elements if t == "svg" and "frequency, Hz" in (a["aria-label"] or "")
+    ]
+    assert drawn.endswith("from 12345 to 12345")
+    assert len(of_rows.elements) > 0
+    assert "12345" not in of_rows.text
