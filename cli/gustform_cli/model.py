@@ -82,9 +82,13 @@ def _select(assembled: Assembled, built: Built) -> tuple[list[Channel], dict[str
     if assembled.frequency is not None and built.linked.channel(assembled.frequency) is not None:
         wanted.insert(0, assembled.frequency)
     channels, aliases = built.linked.select(wanted)
-    inputs = {
+    return with_best_names(channels, aliases, all_inputs(assembled))
+
+
+def all_inputs(assembled: Assembled) -> set[str]:
+    """The names of all inputs, which say what a component reads and not what it is."""
+    return {
         f"{name}.{declared}"
         for name, component in assembled.system.components.items()
         for declared in component.declared(Input)
     }
-    return with_best_names(channels, aliases, inputs)

@@ -15,7 +15,7 @@ import os
 import re
 import tempfile
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -106,6 +106,7 @@ class ResultWriter:
         block_rows: int,
         attributes: Mapping[str, str],
         name: str = RESULT,
+        precision: str = "float32",
     ) -> None:
         import h5py  # 0.2 s: not for `gustform --help`
 
@@ -115,7 +116,8 @@ class ResultWriter:
         self._variables = arrange(quantities, counts)
         # A block is a chunk: it is written once, and HDF5 has nothing to keep that would grow with the run.
         self._chunk_rows = min(block_rows, most_rows)
-        self._compressed = 4 * most_rows * len(quantities) > _COMPRESSED_FROM
+        self._type = np.dtype(precision)
+        self._compressed = self._type.itemsize * most_rows * len(quantities) > _COMPRESSED_FROM
         widest = max((v.columns.size for v in self._variables), default=1)
         try:
             self._file = h5py.File(self.path, "w", track_order=True, rdcc_nbytes=8 * self._chunk_rows * widest)
@@ -140,7 +142,7 @@ class ResultWriter:
             dataset = self._file.create_dataset(
                 variable.quantity.name,
                 (0, *tail),
-                np.float32,
+                self._type,
                 maxshape=(most_rows, *tail),
                 chunks=(self._chunk_rows, *tail),
                 compression="gzip" if self._compressed else None,
@@ -163,7 +165,7 @@ class ResultWriter:
         scale.make_scale(name)
         return scale
 
-    def append(self, times: NDArray[np.float64], rows: NDArray[np.float32]) -> None:
+    def append(self, times: NDArray[np.float64], rows: NDArray[Any]) -> None:
         """Write a block, rows x columns, and see it to the disk. GF7001 when it cannot be (the disk is full)."""
         end = self.rows + times.size
         try:
@@ -176,7 +178,7 @@ class ResultWriter:
             raise _not_written(self.path, error) from None
         self.rows = end
 
-    def _write(self, dataset: h5py.Dataset, block: NDArray[np.float32]) -> None:
+    def _write(self, dataset: h5py.Dataset, block: NDArray[Any]) -> None:
         """Add a block to one variable. Whole chunks go past HDF5's selection machinery and its filters, which would
         take ten times as long as the writing itself."""
         end = self.rows + block.shape[0]
@@ -184,17 +186,22 @@ class ResultWriter:
         if self.rows % self._chunk_rows or block.shape[0] > self._chunk_rows:
             dataset[self.rows : end] = block
             return
-        chunk = np.zeros(dataset.chunks, np.float32)  # the last one is shorter; what lies beyond the end is not read
+        chunk = np.zeros(dataset.chunks, dataset.dtype)  # the last one is shorter; what lies beyond the end is not read
         chunk[: block.shape[0]] = block
         data = chunk.tobytes()
         if self._compressed:  # as HDF5's shuffle and gzip do it: first bytes of all values, second bytes, ...
-            shuffled = np.frombuffer(data, np.uint8).reshape(-1, 4).T
+            shuffled = np.frombuffer(data, np.uint8).reshape(-1, chunk.itemsize).T
             data = zlib.compress(shuffled.tobytes(), 1)
         dataset.id.write_direct_chunk((self.rows, *[0] * (chunk.ndim - 1)), data)
 
-    def finish(self, status: str, statistics: Mapping[str, Any]) -> Path:
-        """Write how the run ended, close the file and give it its name. Returns the path it has then."""
+    def finish(
+        self, status: str, statistics: Mapping[str, Any], add: Callable[[h5py.File], None] | None = None
+    ) -> Path:
+        """Write how the run ended, close the file and give it its name. `add` may put groups into it before. Returns
+        the path it has then."""
         try:
+            if add is not None:
+                add(self._file)
             self._file.attrs["status"] = status
             self._file.attrs["statistics"] = json.dumps(statistics)
             self._file.close()

@@ -12,24 +12,25 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gustform.language.errors import GustformError
 from gustform_cli.assemble import Assembled
 from gustform_cli.frequency import FrequencyWatch
+from gustform_cli.grid_events import SAMPLES, EventWatch, windows
 from gustform_cli.model import Model
 from gustform_cli.names import short_aliases
 from gustform_cli.result import Quantity, ResultWriter
+from gustform_cli.rows import RowBlocks, Rows, Times
+from gustform_cli.sampling import RowSampler, Sampler, WindowSampler, advance
+from gustform_cli.statistics import Plan, Report, as_dict, needs_starts, plan, report
+from gustform_cli.statistics_group import write_statistics
 from gustform_cli.summary import Summary, solver_figures
 from gustform_cli.trips import TripWatch
 from gustform_cli.versions import versions
 from gustform_codegen.table import SystemTable
 
 if TYPE_CHECKING:
-    from gustform_runtime import Simulation, Status
-
-Times = NDArray[np.float64]
-Rows = NDArray[np.float32]
+    from gustform_runtime import Simulation, Statistics, Status
 
 _BLOCK_BYTES = 1 << 20  # of one block of rows, at most: some 20 rows of a thousand turbines
 _BLOCKS = 20  # of a run, at least: what a killed run may lose
@@ -55,7 +56,7 @@ class Run:
     """A run into `file`, or into none. A context; `execute` may work in any thread while others use `time` and
     `request_stop`.
 
-    `table` starts in the steady state and has the channels of the model. `watchers` see every block of rows as well.
+    `table` starts in the steady state. `watchers` see every portion of the stored rows as well.
     """
 
     def __init__(
@@ -66,8 +67,10 @@ class Run:
         watchers: Sequence[Callable[[Times, Rows], None]] = (),
     ) -> None:
         scenario = model.assembled.scenario
-        self.model, self.table = model, table
+        self.model, self._table = model, table
         self.until, self.every = scenario.run.until, scenario.output.every
+        self.plan: Plan = plan(model)
+        self.statistics: Report | None = None  # of a run that is over
         rows = math.floor(self.until / self.every * (1.0 + 1e-9)) + 2
         fitting = max(16, _BLOCK_BYTES // (4 * max(1, len(model.channels))))
         self.block_rows = min(fitting, int(np.clip(rows // _BLOCKS, *_BLOCK_ROWS)))
@@ -75,6 +78,10 @@ class Run:
         event = min((event.at for event in scenario.events), default=None)
         self.watch = FrequencyWatch(event, self.until) if frequency in names else None
         self.watched = names.index(frequency) if frequency in names else -1
+        happening = [(event.at, event.set) for event in scenario.events] if frequency in names else []
+        self.events = EventWatch(windows(happening, self.until))
+        self._sparse = self.every > SAMPLES  # rows are too far apart for what comes after an event
+        self._blocks = RowBlocks(self.block_rows, len(names), scenario.output.precision, self._write)
         self.trips = TripWatch(names)
         self.most_rows = rows
         self.file = file
@@ -109,20 +116,30 @@ class Run:
         if self._simulation is not None:
             self._simulation.request_stop()
 
+    @property
+    def table(self) -> SystemTable:
+        """The system with the channels of the rows: those to be stored, then those of statistics only."""
+        return self._table.with_channels(list(self.plan.columns))
+
     def execute(self, build_seconds: float = 0.0) -> Ended:
         """Run to the end or to what stops it; the result file, if any, is closed in every case. Defects are raised."""
         from gustform_runtime import RunError, Simulation
 
         error, status = None, "completed"
-        statistics: dict[str, int | float] = {}
+        counters: dict[str, int | float] = {}
+        if needs_starts(self.model):
+            self.plan = plan(self.model, self._starts())
         writer = self._writer = self._new_writer() if self.file is not None else None
         begin = time.perf_counter()
         try:
             self._simulation = Simulation(self.table.to_bytes())
+            statistics = self.plan.create() if self.plan.needed else None
             try:
-                status = self._integrate(self._simulation, writer)
+                status = self._integrate(self._simulation, statistics)
             finally:
-                statistics = self._simulation.statistics()
+                counters = self._simulation.statistics()
+                if statistics is not None:
+                    self.statistics = report(self.plan, statistics)
         except GustformError as failure:
             error, status = failure, "failed"
         except RunError as failure:
@@ -131,6 +148,10 @@ class Run:
             if writer is not None:
                 writer.finish("failed", {})
             raise
+        try:
+            self._blocks.flush()
+        except GustformError as failure:
+            error, status = error or failure, "failed"
         summary = Summary(
             status=status,
             message=str(error) if error is not None else None,
@@ -139,13 +160,20 @@ class Run:
             build_seconds=build_seconds,
             compiled_types=self.model.built.compilations,
             unknowns=self.table.n_unknowns,
-            solver=solver_figures(statistics),
+            solver=solver_figures(counters),
             frequency=self.watch.summary(self.every) if self.watch is not None else None,
+            events=self.events.summary(),
             trips=self.trips.times,
             warnings=tuple(self.model.assembled.warnings),
+            statistics=as_dict(self.statistics) if self.statistics is not None else {},
         )
-        file = writer.finish(status, summary.as_dict()) if writer is not None else None
+        file = self._finish(writer, summary) if writer is not None else None
         return Ended(summary, file, error)
+
+    def _finish(self, writer: ResultWriter, summary: Summary) -> Path:
+        found = self.statistics
+        write = None if found is None else lambda file: write_statistics(file, found)
+        return writer.finish(summary.status, summary.as_dict(), write)
 
     def _new_writer(self) -> ResultWriter:
         assert self.file is not None
@@ -157,10 +185,28 @@ class Run:
             block_rows=self.block_rows,
             attributes=_attributes(self.model),
             name=self.file.name,
+            precision=self.model.assembled.scenario.output.precision,
         )
 
-    def _integrate(self, simulation: Simulation, writer: ResultWriter | None) -> str:
+    def _integrate(self, simulation: Simulation, statistics: Statistics | None) -> str:
         """Advance to the end; "completed" or "interrupted"."""
+        self._prepare(simulation)
+        samplers: list[Sampler] = []
+        if self.model.assembled.scenario.output.precision == "float64":
+            samplers.append(RowSampler(self.every, self._take))
+        else:
+            simulation.set_sink(self.every, self._take, self.block_rows)
+        if self._sparse and self.events.windows:
+            samplers.append(WindowSampler(self.events.windows, self.watched, self.events.add))
+        if statistics is not None:
+            simulation.set_statistics(statistics, self.plan.start)
+        simulation.initialise(0.0)
+        if self._stop:
+            return "interrupted"
+        return _judged(advance(simulation, self.until, samplers), simulation.message)
+
+    def _prepare(self, simulation: Simulation) -> None:
+        """Options and readers."""
         assembled = self.model.assembled
         run = assembled.scenario.run
         simulation.set_option("rtol", run.rtol)
@@ -170,25 +216,38 @@ class Run:
         longest = assembled.longest_step if run.max_step is None else min(run.max_step, assembled.longest_step)
         if math.isfinite(longest):
             simulation.set_option("max_step", longest)
-        for number, series in enumerate(self.table.series):
+        for number, series in enumerate(self._table.series):
             if series.name in assembled.readers:
                 simulation.set_series_reader(number, assembled.readers[series.name])
 
-        def take(times: Times, rows: Rows) -> None:
-            """A block of rows from the solver's thread."""
-            if writer is not None:
-                writer.append(times, rows)
-            for watcher in self._watchers:
-                watcher(times, rows)
-            self.trips.add(times, rows)
-            if self.watch is not None:
-                self.watch.add(times, rows[:, self.watched].astype(np.float64))
+    def _starts(self) -> dict[str, float]:
+        """What the channels start with."""
+        from gustform_runtime import Simulation
 
-        simulation.set_sink(self.every, take, self.block_rows)
-        simulation.initialise(0.0)
-        if self._stop:
-            return "interrupted"
-        return _judged(simulation.advance(self.until), simulation.message)
+        with Simulation(self.table.to_bytes()) as simulation:
+            self._prepare(simulation)
+            simulation.initialise(0.0)
+            row = simulation.channels()
+        return {channel.name: float(value) for channel, value in zip(self.plan.columns, row, strict=True)}
+
+    def _take(self, times: Times, rows: Rows) -> None:
+        """Rows from the solver's thread, with all columns."""
+        rows = rows[:, : self.plan.stored]
+        if self._writer is not None:
+            self._blocks.add(times, rows)
+        for watcher in self._watchers:
+            watcher(times, rows)
+        self.trips.add(times, rows)
+        if self.watch is not None:
+            hertz = rows[:, self.watched].astype(np.float64)
+            self.watch.add(times, hertz)
+            if not self._sparse:
+                self.events.add(times, hertz)
+
+    def _write(self, times: Times, rows: Rows) -> None:
+        """A whole block, or the last one."""
+        if self._writer is not None:
+            self._writer.append(times, rows)
 
 
 def _attributes(model: Model) -> dict[str, str]:

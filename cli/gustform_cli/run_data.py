@@ -69,7 +69,10 @@ class RunData:
 
     def names(self) -> list[str]:
         """All channels, in the order of the file."""
-        return [name for name, data in self._file.items() if name != "time" and "time" in _dimensions(data)]
+        import h5py
+
+        data = {name: node for name, node in self._file.items() if isinstance(node, h5py.Dataset) and name != "time"}
+        return [name for name, node in data.items() if "time" in _dimensions(node)]
 
     def curve(self, name: str) -> Curve:
         """A channel, every so many rows of it."""

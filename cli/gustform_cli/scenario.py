@@ -17,6 +17,7 @@ from gustform.language.errors import GustformError
 from gustform_cli.document import Document, NodePath, dotted
 from gustform_cli.errors import did_you_mean
 from gustform_cli.fields import Block, Duration, Many, Moment, Name, Tolerance, shown
+from gustform_cli.output_blocks import Output
 from gustform_cli.wind.blocks import WindBlock
 
 M = TypeVar("M", bound=BaseModel)
@@ -56,15 +57,6 @@ class Run(Block):
         "pass", description="pass over the bends of limiters under error control, or locate each and restart there"
     )
     max_step: Duration | None = Field(None, description="longest step of the solver")
-
-
-class Output(Block):
-    """What is kept of a run."""
-
-    every: Duration = Field(0.02, description="spacing of the rows in the result")
-    channels: list[StrictStr] = Field(
-        default_factory=lambda: ["*"], min_length=1, description="names with * and ?, e.g. wt.*"
-    )
 
 
 class Scenario(Block):
@@ -140,6 +132,8 @@ def _model_at(root: type[BaseModel], loc: tuple[str | int, ...]) -> type[BaseMod
             kind = next((member for member in members if _tag_of(member) == step), None)
         if get_origin(kind) is Annotated:
             kind = get_args(kind)[0]
+        if type(None) in (options := get_args(kind)):  # what may be left out
+            kind = next(option for option in options if option is not type(None))
     return kind if isinstance(kind, type) and issubclass(kind, BaseModel) else None
 
 

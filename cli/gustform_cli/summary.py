@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -52,8 +52,8 @@ def solver_figures(statistics: Mapping[str, int | float]) -> dict[str, int]:
 
 @dataclass(frozen=True)
 class Summary:
-    """status: completed, interrupted or failed. Times in s; `frequency` only where there is a grid frequency. `trips`:
-    when which turbine tripped."""
+    """status: completed, interrupted or failed. Times in s; `frequency` and `events` only where there is a grid
+    frequency. `trips`: when which turbine tripped. `statistics`: further keys, statistics, energy and limits."""
 
     status: str
     message: str | None
@@ -64,8 +64,10 @@ class Summary:
     unknowns: int
     solver: dict[str, int] = field(default_factory=dict)
     frequency: dict[str, float | None] | None = None
+    events: Sequence[Mapping[str, Any]] = ()
     trips: Mapping[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+    statistics: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def real_time_factor(self) -> float:
@@ -73,7 +75,7 @@ class Summary:
         return self.simulated_seconds / self.wall_seconds if self.wall_seconds > 0.0 else 0.0
 
     def as_dict(self) -> dict[str, Any]:
-        """The keys of summary.json, flat but for `frequency`, `trips` and `warnings`."""
+        """The keys of summary.json, flat but for `frequency`, `events`, `trips`, `warnings` and what statistics say."""
         result: dict[str, Any] = {
             "status": self.status,
             "simulated_seconds": self.simulated_seconds,
@@ -86,6 +88,9 @@ class Summary:
         }
         if self.frequency is not None:
             result["frequency"] = self.frequency
+        if self.events:
+            result["grid_events"] = [dict(event) for event in self.events]
+        result.update(self.statistics)
         if self.trips:
             result["trips"] = dict(self.trips)
         if self.message is not None:
