@@ -135,7 +135,10 @@ def _turbulence(run: RunFolder, file: h5py.File | None, found: dict[str, Moments
     charts = run_charts.turbulence(file, found, run) if file is not None and found else None
     if charts is None:
         return None
-    note = "Over the stored rows. Spectra after Welch: Hann window, half overlap, averaged to twelfths of an octave."
+    note = (
+        "Distributions are over the stored rows; so are spectra, unless the run made them of every sample. Spectra after "
+        "Welch: Hann window, half overlap, averaged to twelfths of an octave."
+    )
     return [tag("p", note, class_="soft"), charts]
 
 
