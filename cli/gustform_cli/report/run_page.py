@@ -136,8 +136,8 @@ def _turbulence(run: RunFolder, file: h5py.File | None, found: dict[str, Moments
     if charts is None:
         return None
     note = (
-        "Distributions are over the stored rows; so are spectra, unless the run made them of every sample. Spectra after "
-        "Welch: Hann window, half overlap, averaged to twelfths of an octave."
+        "Distributions are over the stored rows; so are spectra, unless the run made them of every sample. "
+        "After Welch: Hann window, half overlap, averaged to twelfths of an octave."
     )
     return [tag("p", note, class_="soft"), charts]
 
