@@ -14,6 +14,7 @@ import pytest
 import scipy.stats
 
 from gustform.language.errors import GustformError
+from gustform_cli.new import SCENARIOS
 from gustform_cli.report.campaign_charts import _rank_correlation
 from gustform_cli.report.report import write_report
 from tests.support.html_page import Page
@@ -77,6 +78,27 @@ def test_the_page_says_what_was_varied_and_what_came_out(tmp_path: Path) -> None
         sum("over wind.wt.speed, m/s and" in label or "over wind.wt.speed and" in label for label in labels(page)) == 2
     )
     assert not any("steps" in label for label in labels(page))
+
+
+def test_a_real_sweep_gives_its_page(tmp_path: Path) -> None:
+    campaign = tmp_path / "campaign.yaml"
+    campaign.write_text(
+        f"name: Reserve\nbase: {SCENARIOS / 'load_step_8ms.yaml'}\nset: {{run.until: 32 s}}\n"
+        "axes:\n  - {type: grid, values: {wt.curtailment: [5 %, 10 %], wt.control.type: [DualPort, Droop]}}\n"
+    )
+    out = tmp_path / "results"
+    swept = gustform("sweep", campaign, "--out", out, "--workers", 1)
+    assert swept.exit_code == 0, swept.output
+    page = page_of(out)
+    assert_harmless(page)
+    table = pq.read_table(out / "scalars.parquet")
+    for nadir in table["frequency.nadir_hz"].to_pylist():
+        assert any(number == pytest.approx(nadir, rel=1e-8) for number in page.numbers)
+    assert "all cases done" in page.text
+    assert "5, 10" in page.text
+    assert "DualPort, Droop" in page.text
+    assert any("frequency.nadir_hz over wt.curtailment and wt.control.type" in label for label in labels(page))
+    assert campaign.read_text() in page.texts
 
 
 def test_failures_are_grouped_by_reason(tmp_path: Path) -> None:
