@@ -11,7 +11,7 @@ import time
 import traceback
 import uuid
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -42,6 +42,7 @@ SUMMARY_SCALARS = (
 
 # Symbols and the steady state are one thread's work: CasADi is not made for several. Runs are not held up by it.
 _building = threading.Lock()
+_last: dict[tuple[str, str, str], tuple[Model, SystemTable]] = {}  # one: a farm's model may be large
 
 
 @dataclass(frozen=True)
@@ -50,6 +51,7 @@ class Task:
 
     number: int
     key: str
+    model: str  # equal for cases with the same model and steady state
     file: str
     text: str
     changes: tuple[Change, ...]
@@ -177,15 +179,24 @@ def version() -> str:
 
 
 def _built(task: Task) -> tuple[Model, SystemTable]:
-    """The model of a case and its table in the steady state. Raises ErrorList or GustformError."""
+    """The model of a case and its table in the steady state. Raises ErrorList or GustformError.
+
+    That of the case before serves again if only seeds differ: the winds are new, the equations are not.
+    """
     with _building:
         assembled = assemble(_base(task.file, task.text).changed(task.changes))
+        about = (task.file, task.text, task.model)
+        if about in _last:
+            model, table = _last[about]
+            return replace(model, assembled=assembled), table
         model = link(assembled)
         try:
             table = steady_state(model.built.linked).table
         except GustformError as unsolved:
             raise placed(unsolved, assembled) from None
-    return model, table.with_channels(model.channels)
+        _last.clear()
+        _last[about] = model, table.with_channels(model.channels)
+        return _last[about]
 
 
 @lru_cache(maxsize=8)

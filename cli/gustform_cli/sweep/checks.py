@@ -20,16 +20,18 @@ _MOST_SHOWN = 20  # errors
 
 
 def distinct(cases: Sequence[Case]) -> list[Case]:
-    """The cases without those that differ from an earlier one in the seeds of their winds only: these have the same
-    model and the same steady state."""
+    """The first case of each model."""
     found: dict[str, Case] = {}
     for one in cases:
-        values = {c.path: c.value for c in one.changes if not (c.path.startswith("wind.") and c.path.endswith(".seed"))}
-        for path, value in values.items():
-            if path.startswith("wind.") and isinstance(value, dict) and value.get("type") == "turbulence":
-                values[path] = {key: item for key, item in value.items() if key != "seed"}
-        found.setdefault(json.dumps(values, sort_keys=True, default=str), one)
+        found.setdefault(one.model, one)
     return list(found.values())
+
+
+def by_model(cases: Sequence[Case]) -> list[Case]:
+    """Cases of the same model one after the other, so that a worker builds it once."""
+    place: dict[str, int] = {}
+    models = [place.setdefault(one.model, len(place)) for one in cases]
+    return [one for _, one in sorted(zip(models, cases, strict=True), key=lambda pair: pair[0])]
 
 
 def check_all(

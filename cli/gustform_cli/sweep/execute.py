@@ -16,7 +16,7 @@ from gustform_cli.result import prepare_folder
 from gustform_cli.sweep import case
 from gustform_cli.sweep.case import RUNS, SUMMARY_SCALARS, Fault, Outcome, Task, is_left_over, result_name
 from gustform_cli.sweep.case_progress import CaseProgress
-from gustform_cli.sweep.checks import check_all, check_scalars, distinct
+from gustform_cli.sweep.checks import by_model, check_all, check_scalars, distinct
 from gustform_cli.sweep.local import LocalPool, Lost
 from gustform_cli.sweep.plan import Case, Plan, plan
 from gustform_cli.sweep.store import Record, Store
@@ -65,7 +65,7 @@ def sweep(file: Path, out: Path, workers: int, scheduler: str | None, interrupt:
             interrupt.running(lambda: None)  # from here on a signal ends the sweep, with what it has
             before = time.perf_counter()
             with _folder_of_results(the_plan, out) as mark:
-                tasks = [_task(the_plan, one, out, mark) for one in missing]
+                tasks = [_task(the_plan, one, out, mark) for one in by_model(missing)]
                 if scheduler is None:
                     ran = _run(the_plan, store, local, tasks, out, interrupt)
                 else:
@@ -118,6 +118,7 @@ def _task(the_plan: Plan, one: Case, out: Path, mark: str | None) -> Task:
     return Task(
         one.number,
         one.key,
+        one.model,
         str(the_plan.base_file.resolve()),
         the_plan.base_text,
         one.changes,

@@ -33,10 +33,24 @@ class Case:
     changes: tuple[Change, ...]
     labels: Mapping[str, Any]
 
+    @property
+    def model(self) -> str:
+        """Equal for cases with the same model and the same steady state: they differ in the seeds of winds only."""
+        return json.dumps([_without_seed(change) for change in self.changes], sort_keys=True, default=str)
+
     def text(self) -> str:
         """What the case is, for messages."""
         values = ", ".join(f"{name} = {value}" for name, value in self.labels.items())
         return f"case {self.number} ({values})" if values else f"case {self.number}"
+
+
+def _without_seed(change: Change) -> tuple[str, Any]:
+    path, value = change.path, change.value
+    if path.startswith("wind.") and path.endswith(".seed"):
+        return path, None
+    if path.startswith("wind.") and isinstance(value, Mapping):
+        return path, {key: item for key, item in value.items() if key != "seed"}
+    return path, value
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,9 @@ from tests.unit.cli.sweep.campaigns import BASE
 def task(number: int, folder: Path) -> Task:
     settings = {"run.until": "2 s", "events": [], "wind.wt.seed": number, "wt.curtailment": f"{5 + number % 7} %"}
     changes = tuple(Change(path, value, None) for path, value in settings.items())
-    return Task(number, f"{number:032x}", str(BASE), BASE.read_text(), changes, 0.0, "all", str(folder))
+    return Task(
+        number, f"{number:032x}", f"model {number % 7}", str(BASE), BASE.read_text(), changes, 0.0, "all", str(folder)
+    )
 
 
 def test_memory_and_handles_stay(tmp_path: Path) -> None:
