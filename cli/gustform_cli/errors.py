@@ -15,7 +15,12 @@ GF2303 unit not understood      GF2503 no such column        GF2506 wind file do
 GF2504 stamps not increasing    GF2507 speed that no wind has   GF2508 not the format, or cut short
 GF2509 shape does not fit       GF2510 gap in the wind file     GF2511 times, zone and start do not fit
 GF2512 package not installed    GF2513 samples too far apart
+GF2601 axis of the wrong shape  GF2602 path set twice        GF2603 range that is none
+GF2604 wind of a campaign       GF2606 no scalar matches     GF2607 dask is not installed
+GF2608 no scheduler or workers  GF2609 worker of another version
+GF6901 worker process died      GF6902 defect in a case
 GF7001 result folder not writable   GF7002 result cannot be read   GF7003 file exists already
+GF7004 folder in use by another sweep
 """
 
 from __future__ import annotations

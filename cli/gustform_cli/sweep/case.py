@@ -223,6 +223,8 @@ def _flat(summary: Mapping[str, Any], solver: Mapping[str, Any]) -> Iterator[tup
     for key, value in summary.items():
         if key in _NOT_SCALARS:
             continue
+        if isinstance(value, list):  # of what there are several, as events: events.1.nadir_hz
+            value = {str(number): item for number, item in enumerate(value, start=1)}
         if isinstance(value, Mapping):
             yield from ((f"{key}.{name}", number) for name, number in _flat(value, {}))
         elif value is None:

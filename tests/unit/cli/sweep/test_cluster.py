@@ -27,7 +27,7 @@ def cluster() -> Iterator[Any]:
     # Workers import gustform from where this process does.
     os.environ["PYTHONPATH"] = os.pathsep.join(path for path in sys.path if path)
     with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0", silence_logs=50
     ) as made:
         yield made
 
