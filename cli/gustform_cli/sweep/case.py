@@ -93,16 +93,26 @@ class Outcome:
     data: bytes | None = field(default=None, repr=False)
 
 
-def check(task: Task) -> tuple[list[Fault], dict[str, str]]:
-    """What is wrong with a case, up to its steady state, and the units of the columns it will have."""
+@dataclass(frozen=True)
+class Checked:
+    """What can be said of a case before it runs; `units` are those of the columns it will have."""
+
+    faults: tuple[Fault, ...] = ()
+    units: Mapping[str, str] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+
+
+def check(task: Task) -> Checked:
+    """Build a case up to its steady state."""
     try:
         model, _ = _built(task)
     except ErrorList as several:
-        return [Fault.of(error) for error in several.errors], {}
+        return Checked(tuple(Fault.of(error) for error in several.errors))
     except GustformError as error:
-        return [Fault.of(error)], {}
+        return Checked((Fault.of(error),))
     trips = [channel.name.removesuffix(".tripped") for channel in model.channels if channel.name.endswith(".tripped")]
-    return [], {**ChannelMoments.units(model.channels), **{f"trips.{name}": "s" for name in trips}}
+    units = {**ChannelMoments.units(model.channels), **{f"trips.{name}": "s" for name in trips}}
+    return Checked((), units, tuple(model.assembled.warnings))
 
 
 def run(task: Task) -> Outcome:

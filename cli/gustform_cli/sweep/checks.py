@@ -4,6 +4,7 @@ in the campaign that makes it so."""
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Sequence
 from typing import Any
 
@@ -37,23 +38,28 @@ def by_model(cases: Sequence[Case]) -> list[Case]:
 def check_all(
     plan: Plan, tasks: Sequence[tuple[Case, Task]], pool: LocalPool, progress: CaseProgress
 ) -> dict[str, str]:
-    """The units of the columns that these cases will have. Raises ErrorList with everything that is wrong with them."""
+    """The units of the columns that these cases will have. Raises ErrorList with everything that is wrong with them;
+    warnings go to stderr."""
     cases = {task.number: one for one, task in tasks}
-    faults: dict[Case, list[Fault]] = {}
+    faults: dict[Case, tuple[Fault, ...]] = {}
     units: dict[str, str] = {}
+    warnings: dict[str, None] = {}
     good: list[Case] = []
     for done, (task, result) in enumerate(pool.map(case.check, [task for _, task in tasks]), start=1):
         one = cases[task.number]
         if isinstance(result, Lost):
-            faults[one] = [Fault("GF6901", f"the worker process died: {result.reason}", "", None)]
-        elif result[0]:
-            faults[one] = result[0]
+            faults[one] = (Fault("GF6901", f"the worker process died: {result.reason}", "", None),)
+        elif result.faults:
+            faults[one] = result.faults
         else:
             good.append(one)
-            units.update(result[1])
+            units.update(result.units)
+            warnings.update(dict.fromkeys(result.warnings))
         progress.show(done)
     if faults:
         raise ErrorList(_errors(plan, faults, good))
+    for text in warnings:
+        print(f"warning: {text}", file=sys.stderr)
     return units
 
 
@@ -73,7 +79,7 @@ def check_scalars(plan: Plan, names: Sequence[str]) -> None:
         raise ErrorList(errors)
 
 
-def _errors(plan: Plan, faults: dict[Case, list[Fault]], good: Sequence[Case]) -> list[GustformError]:
+def _errors(plan: Plan, faults: dict[Case, tuple[Fault, ...]], good: Sequence[Case]) -> list[GustformError]:
     """One error for each fault, with the first case that has it and how many there are."""
     alike: dict[tuple[str, Any], list[Case]] = {}
     first: dict[tuple[str, Any], Fault] = {}

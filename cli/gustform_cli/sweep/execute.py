@@ -71,6 +71,7 @@ def sweep(file: Path, out: Path, workers: int, scheduler: str | None, interrupt:
                 else:
                     ran = _run_there(scheduler, the_plan, store, tasks, out, interrupt)
         interrupt.closing()
+        after = time.perf_counter()
         return Swept(
             plan=the_plan,
             folder=out,
@@ -84,7 +85,7 @@ def sweep(file: Path, out: Path, workers: int, scheduler: str | None, interrupt:
                 if one.key in store.records and store.records[one.key].status == "failed"
             ),
             check_seconds=before - begin,
-            run_seconds=time.perf_counter() - before,
+            run_seconds=after - before,
         )
 
 

@@ -175,6 +175,15 @@ def test_a_scalar_that_no_case_has_is_refused_before(tmp_path: Path) -> None:
     assert "try wt.P.mean" in result.stderr
 
 
+def test_a_warning_is_said_once_and_before(tmp_path: Path) -> None:
+    body = "axes: [{type: grid, values: {wind.wt.seed: [1, 2], wt.curtailment: [5 %, 6 %], wind.wt.on_end: [repeat]}}]"
+    short = SHORT.replace("set: {", "set: {wind.wt.duration: 3 s, ")
+    result = sweep(write(tmp_path, body, short), tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    assert result.stderr.count("warning: ") == 1
+    assert "repeat" in result.stderr
+
+
 def test_ctrl_c_keeps_what_has_ended(tmp_path: Path) -> None:
     values = ", ".join(f"{seed}" for seed in range(1, 201))
     body = f"axes: [{{type: grid, values: {{wind.wt.seed: [{values}]}}}}]\nkeep: all"
