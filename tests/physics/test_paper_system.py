@@ -174,3 +174,15 @@ def test_ten_turbines_are_one_aggregated(cache: KernelCache) -> None:
         # the same DAE with other steps: 10 x rtol
         size = max(b.table.nominal[k], abs(final[1][k]))
         assert abs(final[0][numbers_a[other]] - final[1][k]) < 1e-5 * size, name
+
+
+@pytest.mark.parametrize("wind", WINDS)
+def test_ipopt_and_newton_give_the_same_start(wind: float, cache: KernelCache, monkeypatch: pytest.MonkeyPatch) -> None:
+    linked = build(mine.paper_system(wind), cache).linked
+    quick = steady_state(linked)
+    monkeypatch.setattr("gustform_codegen.initial.newton", lambda *_: None)  # Ipopt begins where Newton gave up
+    patient = steady_state(linked)
+    nominal = linked.table.nominal
+    # both end with scaled residuals below 1e-10; the slowest direction of the system magnifies that by some 1e3
+    np.testing.assert_allclose(patient.table.start / nominal, quick.table.start / nominal, atol=1e-7)
+    assert patient.free == pytest.approx(quick.free, abs=1e-7)
