@@ -178,8 +178,8 @@ def test_statistics_begin_where_they_are_told(tmp_path: Path) -> None:
 
 def test_double_precision_rounds_to_single(tmp_path: Path) -> None:
     """Rows of either kind are the same numbers, also at the moment of an event, where they hold what was before it."""
-    for name in ("float32", "float64"):
-        simulate(tmp_path / name, "run.until=70 s", "events[0].at=60 s", f"output.precision={name}")
+    for kind in ("float32", "float64"):
+        simulate(tmp_path / kind, "run.until=70 s", "events[0].at=60 s", f"output.precision={kind}")
     with (
         xarray.open_dataset(tmp_path / "float32/result.nc") as single,
         xarray.open_dataset(tmp_path / "float64/result.nc") as double,
