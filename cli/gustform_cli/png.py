@@ -15,8 +15,9 @@ if TYPE_CHECKING:
 _COLOURS = 64  # palette, half tones at the edges of lines among them
 
 
-def save(figure: Figure, file: Path, dpi: float = 150.0) -> Path:
-    """Draw the figure into the file; GF7001 if it cannot be written."""
+def save(figure: Figure, file: Path, dpi: float = 150.0, *, scale: bool = False) -> Path:
+    """Draw the figure into the file; GF7001 if it cannot be written. `scale`: small marks have colours of a continuous
+    scale, which a palette that goes by area would merge."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from PIL import Image  # comes with matplotlib, which needs it for this very purpose
 
@@ -24,7 +25,8 @@ def save(figure: Figure, file: Path, dpi: float = 150.0) -> Path:
     canvas: Any = FigureCanvasAgg(figure)  # its methods carry no types
     canvas.draw()
     drawn = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
-    palette = drawn.quantize(_COLOURS, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    colours, method = (256, Image.Quantize.MAXCOVERAGE) if scale else (_COLOURS, Image.Quantize.MEDIANCUT)
+    palette = drawn.quantize(colours, method=method, dither=Image.Dither.NONE)
     try:
         palette.save(file, optimize=True)
     except (OSError, ValueError) as error:
