@@ -21,6 +21,8 @@ GF2608 no scheduler or workers  GF2609 worker of another version
 GF6901 worker process died      GF6902 defect in a case
 GF7001 result folder not writable   GF7002 result cannot be read   GF7003 file exists already
 GF7004 folder in use by another sweep
+GF7006 no checkpoint here          GF7007 checkpoint of another model or version
+GF7008 checkpoint damaged
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ import typer
 DONE, FAILED, USAGE, INTERRUPTED = 0, 1, 2, 130
 
 # Codes of what the caller can mend on the command line or in the scenario: the exit code is then 2.
-_USAGE_CODES = ("GF2", "GF7001", "GF7002", "GF7003")
+_USAGE_CODES = ("GF2", "GF7001", "GF7002", "GF7003", "GF7006", "GF7007", "GF7008")
 
 
 @contextmanager

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +47,21 @@ class FrequencyWatch:
             if times[0] <= target <= times[-1] + 1e-9 * max(1.0, target):
                 self._samples[target] = float(np.interp(target, times, hertz))
         self._last = float(times[-1]), float(hertz[-1])
+
+    def state(self) -> dict[str, Any]:
+        """All of it, for a checkpoint."""
+        return {
+            "nadir": self.nadir,
+            "nadir_time": self.nadir_time,
+            "samples": sorted(self._samples.items()),
+            "last": self._last,
+        }
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Go on from a state."""
+        self.nadir, self.nadir_time = state["nadir"], state["nadir_time"]
+        self._samples = dict(state["samples"])
+        self._last = tuple(state["last"]) if state["last"] is not None else None
 
     def summary(self, every: float) -> dict[str, float | None]:
         """The `frequency` part of summary.json; None where the run or its rows do not reach."""

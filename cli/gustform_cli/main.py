@@ -1,4 +1,4 @@
-"""The command `gustform`: simulate, check, sweep, linearise, design, study, info, plot, report, new.
+"""The command `gustform`: simulate, check, sweep, linearise, design, study, export, info, plot, report, new.
 
 Only what a command needs is loaded when it runs; `gustform --help` loads none of it. Exit codes: 0 done, 1 the model
 or the run failed, 2 usage or scenario, 130 interrupted.
@@ -15,6 +15,7 @@ from typing import Annotated
 import typer
 
 from gustform_cli.exits import DONE, FAILED, INTERRUPTED, USAGE, guarded
+from gustform_cli.export_app import export
 from gustform_cli.study.app import study
 
 app = typer.Typer(
@@ -26,6 +27,7 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 app.add_typer(study)
+app.add_typer(export)
 
 Scenario = Annotated[Path, typer.Argument(metavar="SCENARIO.yaml", help="scenario file; `gustform new` writes one")]
 Overrides = Annotated[
@@ -37,20 +39,34 @@ Json = Annotated[bool, typer.Option("--json", help="print the result as JSON on 
 
 @app.command()
 def simulate(
-    scenario: Scenario,
+    scenario: Annotated[
+        Path | None, typer.Argument(metavar="SCENARIO.yaml", help="scenario file; `gustform new` writes one")
+    ] = None,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="folder of the results [results/NAME]")] = None,
     overrides: Overrides = None,
     json: Json = False,
     figure: Annotated[bool, typer.Option(help="draw figure.png")] = True,
+    resume: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="go on with the run in DIR from its last checkpoint")
+    ] = None,
 ) -> None:
     """Run a scenario; writes result.nc, summary.json and figure.png."""
+    if (scenario is None) == (resume is None):
+        raise typer.BadParameter("SCENARIO.yaml or --resume DIR is needed, one of them")
+    if resume is not None and (out is not None or overrides):
+        raise typer.BadParameter("--resume takes scenario and folder from DIR, without --out and --set")
     from gustform_cli.interrupt import Interrupt
 
     with Interrupt() as interrupt, guarded():
+        from gustform_cli.simulate import resume as go_on
         from gustform_cli.simulate import simulate as run
 
-        folder = out if out is not None else Path("results") / scenario.stem
-        outcome = run(scenario, folder, overrides or [], interrupt, figure=figure)
+        if scenario is not None:
+            folder = out if out is not None else Path("results") / scenario.stem
+            outcome = run(scenario, folder, overrides or [], interrupt, figure=figure)
+        else:
+            assert resume is not None
+            outcome = go_on(resume, interrupt, figure=figure)
         if outcome.error is not None:
             print(outcome.error, file=sys.stderr)
         from gustform_cli.closing import closing_lines, summary_json

@@ -29,8 +29,8 @@ class RunProgress:
 
     doing = "simulating"
 
-    def __init__(self, until: float) -> None:
-        self.until = until
+    def __init__(self, until: float, start: float = 0.0) -> None:
+        self.until, self._start = until, start
         self._begin = time.perf_counter()
         self._last_line = self._begin
         self._bar: Progress | None = None
@@ -72,7 +72,7 @@ class RunProgress:
     def state(self, simulated: float, waited: float) -> str:
         """ "12.0 / 90.0 s, 340 x real time, 0:02 left"."""
         text = f"{simulated:.1f} / {self.until:.1f} s"
-        if simulated > 0.0 and waited > 0.0:
-            factor = simulated / waited
+        if simulated > self._start and waited > 0.0:
+            factor = (simulated - self._start) / waited
             text += f", {times(factor)} x real time, {clock((self.until - simulated) / factor)} left"
         return text

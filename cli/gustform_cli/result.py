@@ -10,6 +10,7 @@ asks all variables for their length, each time anybody asks one, which takes 40 
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import re
@@ -18,7 +19,7 @@ import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 RESULT = "result.nc"
 PARTIAL = f"{RESULT}.part"
 
+_ROOM = 256 << 10  # bytes beyond a block, for what HDF5 keeps beside it and for closing the file
 _COMPRESSED_FROM = 16 << 20  # bytes; below, the time is worth more than the space
 
 _INSTANCE = re.compile(r"(?P<component>[^.\[]+)\[(?P<number>\d+)\](?P<rest>\..*)")
@@ -107,12 +109,15 @@ class ResultWriter:
         attributes: Mapping[str, str],
         name: str = RESULT,
         precision: str = "float32",
+        part: str | None = None,
+        closing: int = 0,
     ) -> None:
         import h5py  # 0.2 s: not for `gustform --help`
 
-        self.path = folder / f"{name}.part"
+        self.path = folder / (part or f"{name}.part")
         self.rows = 0
         self._final = folder / name
+        self._room = _ROOM + closing
         self._variables = arrange(quantities, counts)
         # A block is a chunk: it is written once, and HDF5 has nothing to keep that would grow with the run.
         self._chunk_rows = min(block_rows, most_rows)
@@ -120,6 +125,9 @@ class ResultWriter:
         self._compressed = self._type.itemsize * most_rows * len(quantities) > _COMPRESSED_FROM
         widest = max((v.columns.size for v in self._variables), default=1)
         try:
+            with self.path.open("wb"):
+                pass
+            self._look_for_room(0)
             self._file = h5py.File(self.path, "w", track_order=True, rdcc_nbytes=8 * self._chunk_rows * widest)
             self._create(attributes, most_rows)
         except OSError as error:
@@ -168,17 +176,36 @@ class ResultWriter:
     def append(self, times: NDArray[np.float64], rows: NDArray[Any]) -> None:
         """Write a block, rows x columns, and see it to the disk. GF7001 when it cannot be (the disk is full)."""
         end = self.rows + times.size
+        self._look_for_room(times.size)
         try:
-            self._time.resize((end,))
-            self._time[self.rows : end] = times
+            self._write(self._time, times, compressed=False)
             for variable, dataset in zip(self._variables, self._datasets, strict=True):
-                self._write(dataset, rows[:, variable.columns] if variable.dimension else rows[:, variable.columns[0]])
+                block = rows[:, variable.columns] if variable.dimension else rows[:, variable.columns[0]]
+                self._write(dataset, block, self._compressed)
             self._file.flush()
         except OSError as error:
             raise _not_written(self.path, error) from None
         self.rows = end
 
-    def _write(self, dataset: h5py.Dataset, block: NDArray[Any]) -> None:
+    def _look_for_room(self, rows: int) -> None:
+        """GF7001 if the disk has no room for a block and for closing the file after it.
+
+        HDF5 cannot go on, nor even close a file, once a write of its own has failed; so it is not let run into that.
+        """
+        columns = sum(variable.columns.size for variable in self._variables)
+        wanted = rows * (8 + columns * self._type.itemsize) + self._room
+        try:
+            with self.path.open("r+b") as file:
+                size = file.seek(0, os.SEEK_END)
+                try:
+                    os.posix_fallocate(file.fileno(), size, wanted)
+                finally:
+                    file.truncate(size)
+        except OSError as error:
+            if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
+                raise _not_written(self.path, error) from None  # others: there is no asking on such a file system
+
+    def _write(self, dataset: h5py.Dataset, block: NDArray[Any], compressed: bool) -> None:
         """Add a block to one variable. Whole chunks go past HDF5's selection machinery and its filters, which would
         take ten times as long as the writing itself."""
         end = self.rows + block.shape[0]
@@ -189,10 +216,67 @@ class ResultWriter:
         chunk = np.zeros(dataset.chunks, dataset.dtype)  # the last one is shorter; what lies beyond the end is not read
         chunk[: block.shape[0]] = block
         data = chunk.tobytes()
-        if self._compressed:  # as HDF5's shuffle and gzip do it: first bytes of all values, second bytes, ...
+        if compressed:  # as HDF5's shuffle and gzip do it: first bytes of all values, second bytes, ...
             shuffled = np.frombuffer(data, np.uint8).reshape(-1, chunk.itemsize).T
             data = zlib.compress(shuffled.tobytes(), 1)
         dataset.id.write_direct_chunk((self.rows, *[0] * (chunk.ndim - 1)), data)
+
+    # ---- blocks, for checkpoints -----------------------------------------------------------------------------------
+    @property
+    def blocks(self) -> int:
+        """Whole blocks written so far."""
+        return self.rows // self._chunk_rows
+
+    @property
+    def variables(self) -> int:
+        """Variables that a block has a chunk of each of, the time among them."""
+        return 1 + len(self._datasets)
+
+    def places(self, first: int) -> NDArray[np.uint64]:
+        """Offset and size in the file of each chunk of the whole blocks from `first` on: (blocks, variables, 2). They
+        stay there, and nothing writes to them again."""
+        result = np.empty((self.blocks - first, self.variables, 2), np.uint64)
+        for block in range(first, self.blocks):
+            for number, dataset in enumerate([self._time, *self._datasets]):
+                origin = (block * self._chunk_rows, *[0] * (dataset.ndim - 1))
+                found = dataset.id.get_chunk_info_by_coord(origin)
+                result[block - first, number] = found.byte_offset, found.size
+        return result
+
+    def sync(self) -> None:
+        """See to it that the disk has all blocks. GF7001 when it cannot be."""
+        try:
+            self._file.flush()
+            with self.path.open("rb") as written:
+                os.fsync(written.fileno())
+        except OSError as error:
+            raise _not_written(self.path, error) from None
+
+    def adopt(self, source: BinaryIO, places: NDArray[np.uint64]) -> None:
+        """Append whole blocks as they lie in another file of the same kind. ValueError if they do not lie there."""
+        try:
+            for block in places:
+                self._look_for_room(self._chunk_rows)
+                for (offset, size), dataset in zip(block.tolist(), [self._time, *self._datasets], strict=True):
+                    source.seek(offset)
+                    data = source.read(size)
+                    if len(data) != size:
+                        raise ValueError(f"it ends before byte {offset + size}")
+                    dataset.id.set_extent((self.rows + self._chunk_rows, *dataset.shape[1:]))
+                    dataset.id.write_direct_chunk((self.rows, *[0] * (dataset.ndim - 1)), data)
+                self.rows += self._chunk_rows
+            self._file.flush()
+        except OSError as error:
+            raise _not_written(self.path, error) from None
+
+    def abandon(self) -> None:
+        """Close the file and remove it."""
+        self._file.close()
+        self.path.unlink(missing_ok=True)
+
+    def rename(self, path: Path) -> None:
+        """Give the open file another name."""
+        self.path = self.path.replace(path)
 
     def finish(
         self, status: str, statistics: Mapping[str, Any], add: Callable[[h5py.File], None] | None = None

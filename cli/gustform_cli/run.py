@@ -15,6 +15,8 @@ import numpy as np
 
 from gustform.language.errors import GustformError
 from gustform_cli.assemble import Assembled
+from gustform_cli.checkpoint import Checkpoint, discard, interval
+from gustform_cli.checkpointing import Keeper, new_part
 from gustform_cli.frequency import FrequencyWatch
 from gustform_cli.grid_events import SAMPLES, EventWatch, windows
 from gustform_cli.model import Model
@@ -56,7 +58,8 @@ class Run:
     """A run into `file`, or into none. A context; `execute` may work in any thread while others use `time` and
     `request_stop`.
 
-    `table` starts in the steady state. `watchers` see every portion of the stored rows as well.
+    `table` starts in the steady state. `watchers` see every portion of the stored rows as well. With `resume` the run
+    goes on from there; its result is then the same as without the break, bit for bit.
     """
 
     def __init__(
@@ -65,6 +68,7 @@ class Run:
         table: SystemTable,
         file: Path | None,
         watchers: Sequence[Callable[[Times, Rows], None]] = (),
+        resume: Checkpoint | None = None,
     ) -> None:
         scenario = model.assembled.scenario
         self.model, self._table = model, table
@@ -86,6 +90,12 @@ class Run:
         self.most_rows = rows
         self.file = file
         self._watchers = watchers
+        self._resume = resume
+        self._resumed = False  # the rows before the break are in the result
+        self._between = interval(self.until, scenario.run.checkpoint)
+        self._samplers: list[Sampler] = []
+        self._keeper: Keeper | None = None
+        self._begin = 0.0
         self._writer: ResultWriter | None = None
         self._simulation: Simulation | None = None
         self._stop = False
@@ -129,8 +139,8 @@ class Run:
         counters: dict[str, int | float] = {}
         if needs_starts(self.model):
             self.plan = plan(self.model, self._starts())
+        self._begin = time.perf_counter() - (self._resume.wall if self._resume is not None else 0.0)
         writer = self._writer = self._new_writer() if self.file is not None else None
-        begin = time.perf_counter()
         try:
             self._simulation = Simulation(self.table.to_bytes())
             statistics = self.plan.create() if self.plan.needed else None
@@ -146,8 +156,11 @@ class Run:
             error, status = run_error(failure), "failed"
         except BaseException:
             if writer is not None:
-                writer.finish("failed", {})
+                self._leave(writer)
             raise
+        if error is not None and writer is not None and self._resume is not None and not self._resumed:
+            self._leave(writer)
+            raise error
         try:
             self._blocks.flush()
         except GustformError as failure:
@@ -156,7 +169,7 @@ class Run:
             status=status,
             message=str(error) if error is not None else None,
             simulated_seconds=self.time,
-            wall_seconds=time.perf_counter() - begin,
+            wall_seconds=time.perf_counter() - self._begin,
             build_seconds=build_seconds,
             compiled_types=self.model.built.compilations,
             unknowns=self.table.n_unknowns,
@@ -164,20 +177,32 @@ class Run:
             frequency=self.watch.summary(self.every) if self.watch is not None else None,
             events=self.events.summary(),
             trips=self.trips.times,
-            warnings=tuple(self.model.assembled.warnings),
+            warnings=(*self.model.assembled.warnings, *(self._keeper.warnings if self._keeper is not None else ())),
             statistics=as_dict(self.statistics) if self.statistics is not None else {},
         )
         file = self._finish(writer, summary) if writer is not None else None
         return Ended(summary, file, error)
 
+    def _leave(self, writer: ResultWriter) -> None:
+        """End without a summary. A run that was to be resumed and could not be leaves what it found as it was."""
+        if self._resume is None or self._resumed:
+            writer.finish("failed", {})
+        else:
+            writer.abandon()
+
     def _finish(self, writer: ResultWriter, summary: Summary) -> Path:
         found = self.statistics
         write = None if found is None else lambda file: write_statistics(file, found)
-        return writer.finish(summary.status, summary.as_dict(), write)
+        file = writer.finish(summary.status, summary.as_dict(), write)
+        if summary.status == "completed":  # all others can be gone on with
+            discard(file)
+        return file
 
     def _new_writer(self) -> ResultWriter:
         assert self.file is not None
-        return ResultWriter(
+        if self._resume is None:
+            discard(self.file)
+        writer = ResultWriter(
             self.file.parent,
             [Quantity(channel.name, channel.unit, channel.description) for channel in self.model.channels],
             self.model.assembled.counts,
@@ -186,24 +211,74 @@ class Run:
             attributes=_attributes(self.model),
             name=self.file.name,
             precision=self.model.assembled.scenario.output.precision,
+            part=None if self._resume is None else new_part(self.file, self._resume),
+            closing=self.plan.size,
         )
+        if math.isfinite(self._between):
+            self._keeper = Keeper(self.model.assembled, self.file, writer, self.block_rows)
+        return writer
 
     def _integrate(self, simulation: Simulation, statistics: Statistics | None) -> str:
         """Advance to the end; "completed" or "interrupted"."""
         self._prepare(simulation)
-        samplers: list[Sampler] = []
         if self.model.assembled.scenario.output.precision == "float64":
-            samplers.append(RowSampler(self.every, self._take))
+            self._samplers.append(RowSampler(self.every, self._take))
         else:
             simulation.set_sink(self.every, self._take, self.block_rows)
         if self._sparse and self.events.windows:
-            samplers.append(WindowSampler(self.events.windows, self.watched, self.events.add))
+            self._samplers.append(WindowSampler(self.events.windows, self.watched, self.events.add))
         if statistics is not None:
             simulation.set_statistics(statistics, self.plan.start)
         simulation.initialise(0.0)
-        if self._stop:
-            return "interrupted"
-        return _judged(advance(simulation, self.until, samplers), simulation.message)
+        number = 0
+        if self._resume is not None:
+            number = self._go_on(simulation, self._resume)
+        elif math.isfinite(self._between):
+            self._checkpoint(simulation, 0)
+        while not self._stop:
+            number += 1
+            end = min(number * self._between, self.until)
+            status = advance(simulation, end, self._samplers)
+            if status != 0 or end >= self.until:
+                return _judged(status, simulation.message)
+            self._checkpoint(simulation, number)
+        return "interrupted"
+
+    def _checkpoint(self, simulation: Simulation, number: int) -> None:
+        """The solver begins anew here, whether or not a file is written: a resumed run does so too."""
+        simulation.checkpoint()
+        if self._keeper is not None and (number == 0 or self._keeper.due):
+            watches = {
+                "frequency": self.watch.state() if self.watch is not None else None,
+                "events": self.events.state(),
+                "trips": self.trips.times,
+                "samplers": [sampler.state for sampler in self._samplers],
+            }
+            self._keeper.save(simulation, number, self._blocks, watches, time.perf_counter() - self._begin)
+
+    def _go_on(self, simulation: Simulation, found: Checkpoint) -> int:
+        """To the state of a checkpoint; its number."""
+        from gustform_runtime import RunError
+
+        try:
+            simulation.restore(found.solver)
+        except RunError as error:
+            raise GustformError(
+                "GF7007",
+                f"the run cannot be resumed; {error.message}",
+                hint="gustform simulate with the scenario, anew",
+            ) from None
+        assert self._keeper is not None, "a checkpoint asks for more of them"
+        self._keeper.take_up(found)
+        self._resumed = True
+        self._blocks.add(found.times, found.rows)
+        if self.watch is not None:
+            self.watch.restore(found.watches["frequency"])
+        self.events.restore(found.watches["events"])
+        self.trips.times.update(found.watches["trips"])
+        for sampler, state in zip(self._samplers, found.watches["samplers"], strict=True):
+            sampler.restore(state)
+        return found.number
 
     def _prepare(self, simulation: Simulation) -> None:
         """Options and readers."""

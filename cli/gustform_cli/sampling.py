@@ -27,21 +27,37 @@ class Sampler(Protocol):
     @property
     def next(self) -> float: ...
 
+    @property
+    def state(self) -> list[int]:
+        """Where it is, for a checkpoint."""
+        ...
+
+    def restore(self, state: list[int]) -> None:
+        """Go on from there."""
+        ...
+
     def take(self, row: Floats) -> None:
         """All channels at that time."""
         ...
 
 
 class RowSampler:
-    """A row each `every` seconds, from row number `first` on."""
+    """A row each `every` seconds."""
 
-    def __init__(self, every: float, receive: Callable[[Floats, Floats], None], first: int = 0) -> None:
-        self.number = first
+    def __init__(self, every: float, receive: Callable[[Floats, Floats], None]) -> None:
+        self.number = 0
         self._every, self._receive = every, receive
 
     @property
     def next(self) -> float:
         return self.number * self._every
+
+    @property
+    def state(self) -> list[int]:
+        return [self.number]
+
+    def restore(self, state: list[int]) -> None:
+        (self.number,) = state
 
     def take(self, row: Floats) -> None:
         self._receive(np.array([self.next]), row[None, :])
@@ -61,6 +77,13 @@ class WindowSampler:
             return np.inf
         window = self._windows[self.window]
         return min(window.at + self.number * SAMPLES, window.end)
+
+    @property
+    def state(self) -> list[int]:
+        return [self.window, self.number]
+
+    def restore(self, state: list[int]) -> None:
+        self.window, self.number = state
 
     def take(self, row: Floats) -> None:
         now = self.next

@@ -57,6 +57,11 @@ class Run(Block):
         "pass", description="pass over the bends of limiters under error control, or locate each and restart there"
     )
     max_step: Duration | None = Field(None, description="longest step of the solver")
+    checkpoint: Duration | None = Field(
+        None,
+        description="simulated time between checkpoints; from an hour on a fiftieth of the run, at least 10 min, if "
+        "left out",
+    )
 
 
 class Scenario(Block):

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from pathlib import Path
 
 from gustform.language.errors import GustformError
+from gustform_cli.assemble import Assembled, assemble
+from gustform_cli.checkpoint import Checkpoint, read
+from gustform_cli.checkpointing import check_same
+from gustform_cli.document import parse
 from gustform_cli.interrupt import Interrupt
 from gustform_cli.model import link, load, placed, print_warnings
 from gustform_cli.progress import RunProgress
@@ -36,8 +40,28 @@ class Outcome:
 def simulate(file: Path, out: Path, overrides: Sequence[str], interrupt: Interrupt, *, figure: bool = True) -> Outcome:
     """Run a scenario. Errors before the run are raised; what stops the run itself is in the outcome, with the
     results so far written."""
+    return _simulate(lambda: load(file, overrides), out, interrupt, None, figure)
+
+
+def resume(folder: Path, interrupt: Interrupt, *, figure: bool = True) -> Outcome:
+    """Go on with the run in a folder from its last checkpoint. GF7006 if there is none, GF7007 if the model or the
+    versions have changed, GF7008 if it is damaged."""
+    found = read(folder)
+
+    def again() -> Assembled:
+        assembled = assemble(parse(found.scenario, found.scenario_file))
+        check_same(found, assembled)
+        return assembled
+
+    print(f"resuming at {found.time:g} s", file=sys.stderr)
+    return _simulate(again, folder, interrupt, found, figure)
+
+
+def _simulate(
+    assembled_from: Callable[[], Assembled], out: Path, interrupt: Interrupt, found: Checkpoint | None, figure: bool
+) -> Outcome:
     begin = time.perf_counter()
-    assembled = load(file, overrides)
+    assembled = assembled_from()
     print_warnings(assembled)
     prepare_folder(out)
     model = link(assembled)
@@ -52,8 +76,9 @@ def simulate(file: Path, out: Path, overrides: Sequence[str], interrupt: Interru
         f"{table.n_unknowns} unknowns; built in {build_seconds:.2f} s",
         file=sys.stderr,
     )
-    with Run(model, table, out / RESULT) as run:
-        ended = _watch(run, build_seconds, interrupt)
+    name = found.result if found is not None else RESULT
+    with Run(model, table, out / name, resume=found) as run:
+        ended = _watch(run, build_seconds, interrupt, found.time if found is not None else 0.0)
     summary_file = write_summary(ended.summary, out)
     drawn = out / FIGURE
     drawn.unlink(missing_ok=True)  # one of an earlier run would not belong to this result
@@ -64,10 +89,10 @@ def simulate(file: Path, out: Path, overrides: Sequence[str], interrupt: Interru
     return Outcome(ended.result, summary_file, draw(ended.result, drawn), ended.summary, ended.error)
 
 
-def _watch(run: Run, build_seconds: float, interrupt: Interrupt) -> Ended:
+def _watch(run: Run, build_seconds: float, interrupt: Interrupt, start: float) -> Ended:
     """Run in a worker; the main thread shows progress and takes Ctrl-C."""
     interrupt.running(run.request_stop)
-    with ThreadPoolExecutor(1, thread_name_prefix="gustform-run") as worker, RunProgress(run.until) as progress:
+    with ThreadPoolExecutor(1, thread_name_prefix="gustform-run") as worker, RunProgress(run.until, start) as progress:
         future = worker.submit(run.execute, build_seconds)
         while not wait([future], _POLL).done:
             progress.show(run.time)

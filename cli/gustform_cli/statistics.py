@@ -87,6 +87,11 @@ class Plan:
         """Whether there is anything to keep."""
         return bool(self.keeps)
 
+    @property
+    def size(self) -> int:
+        """About how many bytes the results take in a file."""
+        return sum(1024 + 8 * (2 * len(keep.edges) + keep.segment + keep.ranges) for keep in self.keeps)
+
     def create(self) -> Statistics:
         """What the runtime fills; for one run."""
         from gustform_runtime import Statistics
