@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gustform.analysis.gain_design import GainDesign, Specification, design_gains
 from gustform.control.curtailment_schedule import default_table
@@ -16,6 +16,9 @@ from gustform.language.component import suggest
 from gustform.language.errors import GustformError
 from gustform.turbines.pmsg_turbine import PmsgTurbine
 from gustform_cli.quantity import parse_quantity
+
+if TYPE_CHECKING:
+    from gustform_cli.assemble import Assembled
 
 # Options with a quantity: unit and sentence, by the name in Specification.
 QUANTITIES: Mapping[str, tuple[str, str]] = {
@@ -44,7 +47,11 @@ def find_turbine(scenario: Path | None, name: str | None) -> Turbine:
         return Turbine("", PmsgTurbine())
     from gustform_cli.model import load  # half a second, which a design without a scenario does not need
 
-    assembled = load(scenario)
+    return only_turbine(load(scenario), scenario, name)
+
+
+def only_turbine(assembled: Assembled, scenario: Path, name: str | None) -> Turbine:
+    """The turbine of an assembled scenario that is named, or the only one. GF2047."""
     found = {key: unit for key, unit in assembled.system.components.items() if isinstance(unit, PmsgTurbine)}
     names = list(dict.fromkeys(key.partition("[")[0] for key in found))
     if name is None and len(names) == 1:

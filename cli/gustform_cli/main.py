@@ -1,4 +1,4 @@
-"""The command `gustform`: simulate, check, sweep, linearise, design, study, info, plot, report, new.
+"""The command `gustform`: simulate, check, sweep, linearise, design, study, export, info, plot, report, new.
 
 Only what a command needs is loaded when it runs; `gustform --help` loads none of it. Exit codes: 0 done, 1 the model
 or the run failed, 2 usage or scenario, 130 interrupted.
@@ -15,6 +15,7 @@ from typing import Annotated
 import typer
 
 from gustform_cli.exits import DONE, FAILED, INTERRUPTED, USAGE, guarded
+from gustform_cli.export_app import export
 from gustform_cli.study.app import study
 
 app = typer.Typer(
@@ -26,6 +27,7 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 app.add_typer(study)
+app.add_typer(export)
 
 Scenario = Annotated[Path, typer.Argument(metavar="SCENARIO.yaml", help="scenario file; `gustform new` writes one")]
 Overrides = Annotated[

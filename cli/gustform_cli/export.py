@@ -1,0 +1,109 @@
+"""Export a control as a folder of C: which one, with which parameters, at which period."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+from gustform.control.converter_control import ConverterControl
+from gustform.language.component import suggest
+from gustform.language.errors import GustformError
+from gustform.registry import PARTS
+from gustform.turbines.pmsg_turbine import PmsgTurbine
+from gustform_codegen.emit.controller.block import Block, controller_block
+from gustform_codegen.emit.controller.discretise import Method, discretise
+from gustform_codegen.emit.controller.folder import default_prefix, write_folder
+from gustform_codegen.emit.controller.frequency import as_csv, as_text, frequency_response
+from gustform_codegen.emit.controller.program import program
+
+_LONGEST = 1.0  # s; a longer period is a slip of the unit
+
+
+def controls() -> dict[str, type[ConverterControl]]:
+    """The controls that a scenario may name."""
+    return {name: part.kind for name, part in PARTS.items() if issubclass(part.kind, ConverterControl)}
+
+
+def export_controller(
+    name: str,
+    scenario: Path | None,
+    out: Path,
+    *,
+    double: bool,
+    period: str,
+    prefix: str | None,
+    method: str,
+    overrides: Sequence[str],
+    report: bool,
+) -> str:
+    """Write the folder; returns what to print: its path, or with `report` the table of differences before it."""
+    h = _period(period)
+    if scenario is None:
+        if overrides:
+            raise GustformError("GF2070", "--set changes a scenario, and none is given", hint="NAME SCENARIO.yaml")
+        block = _default_block(name)
+    else:
+        block = _block_of_scenario(name, scenario, overrides)
+    made = program(discretise(block, h, Method(method)))
+    write_folder(made, default_prefix(block.name) if prefix is None else prefix, double, out)
+    if not report:
+        return str(out)
+    pairs = frequency_response(made.step)
+    (out / "frequency.csv").write_text(as_csv(pairs), encoding="utf-8", newline="\n")
+    return f"{as_text(made.step, pairs)}\n{out}"
+
+
+def _period(text: str) -> float:
+    from gustform_cli.quantity import parse_quantity
+
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = parse_quantity(text, "s", "--period", "sample period")
+    if not (math.isfinite(seconds) and 0.0 < seconds <= _LONGEST):
+        raise GustformError(
+            "GF2070", f"--period must be above 0 and at most {_LONGEST:g} s; got {text}", hint="--period 1e-3"
+        )
+    return seconds
+
+
+def _default_block(name: str) -> Block:
+    known = controls()
+    if name not in known:
+        raise GustformError(
+            "GF2070", f"{name!r} must be a control of a turbine: {', '.join(known)}", hint=suggest(name, list(known))
+        )
+    turbine = PmsgTurbine(control=known[name]())
+    return controller_block(turbine.control, turbine.pitch)
+
+
+def _block_of_scenario(name: str, scenario: Path, overrides: Sequence[str]) -> Block:
+    from gustform_cli.design import only_turbine
+    from gustform_cli.model import link, load, placed, print_warnings
+    from gustform_codegen.initial import steady_state
+
+    assembled = load(scenario, overrides)
+    print_warnings(assembled)
+    found = only_turbine(assembled, scenario, name)
+    linked = link(assembled).built.linked
+    try:
+        state = steady_state(linked)
+    except GustformError as error:
+        raise placed(error, assembled) from None
+    values = {
+        key.removeprefix(f"{found.name}."): v for key, v in state.free.items() if key.startswith(f"{found.name}.")
+    }
+    for t in linked.types:
+        if found.name in t.names:
+            first = int(t.table.first_unknown[t.names.index(found.name)])
+            at = {u.path: float(state.table.start[first + k]) for k, u in enumerate(t.unit.unknowns)}
+            values |= at
+            values |= {alias: sign * at[path] for alias, (path, sign) in t.unit.aliases.items() if path in at}
+    rounded = {key: _rounded(v) for key, v in values.items()}
+    return controller_block(found.component.control, found.component.pitch, rounded)
+
+
+def _rounded(value: float) -> float:
+    """To the digits that a steady state is solved to, so that the files are the same wherever it is solved."""
+    return float(f"{value:.9g}") if abs(value) > 1e-9 else 0.0

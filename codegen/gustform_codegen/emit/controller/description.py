@@ -1,0 +1,74 @@
+"""<name>.json: every signal and parameter with a stable id, unit, range, default and sentence."""
+
+from __future__ import annotations
+
+import json
+import math
+import zlib
+from typing import Any
+
+from gustform.language.errors import GustformError
+from gustform_codegen.emit.controller.block import Signal
+from gustform_codegen.emit.controller.c_files import ERRORS, Names
+from gustform_codegen.emit.controller.program import Program
+
+
+def stable_id(kind: str, name: str) -> int:
+    """A 16-bit id that depends on the kind and the name alone: it survives what is added or left out beside it."""
+    return zlib.crc32(f"{kind}:{name}".encode()) & 0xFFFF
+
+
+def describe(program: Program, names: Names) -> dict[str, Any]:
+    """The description as plain data. GF4103 if two ids are the same."""
+    block, step = program.step.block, program.step
+    kinds = {
+        "inputs": ("in", block.inputs),
+        "outputs": ("out", block.outputs),
+        "parameters": ("p", step.parameters),
+    }
+    result: dict[str, Any] = {
+        "format": "gustform controller 1",
+        "name": names.prefix,
+        "control": block.name,
+        "description": block.description,
+        "period_s": step.period,
+        "method": step.method.value,
+        "real": "double" if names.double else "float",
+        "prewarped_rad_per_s": step.prewarped,
+    }
+    taken: dict[int, str] = {}
+    for kind, (member, signals) in kinds.items():
+        entries = []
+        for position, s in enumerate(signals):
+            number = stable_id(kind, s.name)
+            if number in taken:
+                raise GustformError("GF4103", f"{s.name} and {taken[number]} have the same id", hint="another name")
+            taken[number] = s.name
+            entries.append(_entry(s, number, member, position))
+        result[kind] = entries
+    result["states"] = [
+        {"name": s.name, "unit": s.unit, "description": s.description, "start": s.value} for s in block.states
+    ]
+    result["errors"] = [{"name": name, "mask": 1 << k, "description": text} for k, (name, text) in enumerate(ERRORS)]
+    return result
+
+
+def _entry(s: Signal, number: int, member: str, position: int) -> dict[str, Any]:
+    return {
+        "id": number,
+        "name": s.name,
+        "c": f"{member}.{s.name}",
+        "position": position,
+        "unit": s.unit,
+        "description": s.description,
+        "min": s.low if math.isfinite(s.low) else None,
+        "min_excluded": s.exclusive,
+        "max": s.high if math.isfinite(s.high) else None,
+        "default": s.value,
+        "nominal": s.nominal,
+    }
+
+
+def as_json(program: Program, names: Names) -> str:
+    """The description as a file."""
+    return json.dumps(describe(program, names), indent=2, ensure_ascii=False) + "\n"

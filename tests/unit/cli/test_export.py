@@ -1,0 +1,73 @@
+"""`gustform export controller`: from a name or a scenario to a folder, and what it says when it cannot."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[3]
+LOAD_STEP = ROOT / "cli" / "gustform_cli" / "scenarios" / "load_step_8ms.yaml"
+
+
+def export(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "gustform_cli", "export", "controller", *arguments]
+    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False)
+
+
+def test_a_control_by_its_name(tmp_path: Path) -> None:
+    options = ["--real", "double", "--period", "500 us", "--prefix", "gfl", "--report"]
+    done = export("GridFollowing", "--out", "rig", *options, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.rstrip().endswith("rig")
+    assert "v_q         omega_gsc" in done.stdout
+    assert {file.name for file in (tmp_path / "rig").iterdir()} == {
+        "gfl.c", "gfl.h", "gfl.json", "test_gfl.c", "vectors.h", "CMakeLists.txt", "README.md", "frequency.csv",
+    }  # fmt: skip
+    found = json.loads((tmp_path / "rig" / "gfl.json").read_text())
+    assert (found["period_s"], found["real"], found["name"]) == (5e-4, "double", "gfl")
+    assert "#define GFL_DOUBLE 1" in (tmp_path / "rig" / "gfl.h").read_text()
+
+
+def test_a_turbine_of_a_scenario_begins_in_its_steady_state(tmp_path: Path) -> None:
+    done = export("wt", str(LOAD_STEP), "--out", "rig", "--set", "components.wt.control.K_gsc=0.4", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    found = json.loads((tmp_path / "rig" / "dual_port.json").read_text())
+    value = {p["name"]: p["default"] for p in found["parameters"]}
+    assert value["K_gsc"] == 0.4
+    # Found by the steady state: V* of the machine side keeps Q_msc = 0, Q* of the grid side what is delivered.
+    assert 0.9 < value["msc_V_ref"] < 1.0
+    state = {s["name"]: s["start"] for s in found["states"]}
+    assert value["gsc_Q_ref"] == state["gsc_Q_filtered"] != 0.0
+    assert state["gsc_xi"] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code"),
+    [
+        (("DualPorts",), "GF2070"),
+        (("PmsgTurbine",), "GF2070"),
+        (("DualPort", "--period", "0"), "GF2070"),
+        (("DualPort", "--period", "5 s"), "GF2070"),
+        (("DualPort", "--period", "5 V"), "GF2302"),
+        (("DualPort", "--prefix", "9x"), "GF2071"),
+        (("DualPort", "--set", "a=1"), "GF2070"),
+        (("nobody", str(LOAD_STEP)), "GF2047"),
+    ],
+)
+def test_what_cannot_be_exported_is_said_in_one_line(arguments: tuple[str, ...], code: str, tmp_path: Path) -> None:
+    done = export(*arguments, cwd=tmp_path)
+    assert done.returncode == 2
+    assert f"error {code}" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_that_cannot_be_written(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    done = export("Matching", "--out", "file", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "error GF7001" in done.stderr
