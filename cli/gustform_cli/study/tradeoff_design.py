@@ -3,7 +3,7 @@
     curtailment     0 ... 20 %                       power held back, 1 - eta
     K_msc, factor   0.1 ... 2, logarithmic           on the largest K_msc that keeps the rotor above the MPP, eq. (19)
     K_p, factor     0 ... 2                          on the largest K_p that keeps the pitch demand above 0, eq. (20)
-    K_gsc           0.25 ... 1 pu, logarithmic       at a constant K_msc/K_gsc, so that it moves the DC voltage only
+    K_gsc           0.25 ... 1 pu, logarithmic       the largest K_msc below rated wind goes with it
     K_d_gsc         0.002 ... 0.03 s, logarithmic    K_d_msc = K_d_gsc K_msc/K_gsc, the theorem's condition
     T_dc            0.02 ... 0.7, logarithmic        share of K_d/K_gsc, at which the filter takes the damping away
     speed margin    0 ... 0.12 pu                    from the highest operating speed to the speed limiter's

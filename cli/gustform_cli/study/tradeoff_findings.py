@@ -53,7 +53,7 @@ def findings(found: Sequence[Row], objectives: Sequence[Measure], steps_per_day:
     lines: list[str] = []
     if FR.name in by_name and MPPT.name in by_name:
         fr, mppt = by_name[FR.name], by_name[MPPT.name]
-        lines += [_support(fr, mppt, steps_per_day), _fatigue(fr), *_cheaper(found, fr, mppt), *_better(found, fr)]
+        lines += [_support(fr, mppt, steps_per_day), _fatigue(fr), *_cheaper(found, fr, mppt), *_smaller(found, fr)]
     lines += _moves(correlations(found, list(RANGES), CORRELATED))
     lines += [_front(found, objectives), *_capacitor(found), *_torsion(found), *_left_out(found)]
     return lines
@@ -112,20 +112,21 @@ def _cheaper(found: Sequence[Row], fr: Row, mppt: Row) -> list[str]:
     return [text]
 
 
-def _better(found: Sequence[Row], fr: Row) -> list[str]:
-    """The design that needs least capacitor at the paper's nadir."""
+def _smaller(found: Sequence[Row], fr: Row) -> list[str]:
+    """The design that needs least capacitor for the paper's nadir."""
+    own = fr.measures[CAPACITOR.key]
     small = best(
         found,
         lambda row: row.measures[CAPACITOR.key],
         lambda row: row.measures[NADIR.key] >= fr.measures[NADIR.key] and row is not fr,
     )
-    if small is None:
-        return []
+    if small is None or small.measures[CAPACITOR.key] >= own:
+        return [f"**The capacitor of that nadir.** No sampled design has it with less than {FR.name}, {_or_none(own)}."]
     m = small.measures
     text = (
-        f"**The nadir of the paper with the smallest capacitor.** {small.design.name} ({described(small.design)}) "
-        f"needs {m[CAPACITOR.key]:.3g} mF for {m[NADIR.key]:.3f} Hz (energy lost {m[ENERGY.key]:.1f} %, DEL "
-        f"{m[FATIGUE.key]:.3f} MN m); {FR.name} itself needs {_or_none(fr.measures[CAPACITOR.key])}."
+        f"**The capacitor of that nadir.** {small.design.name} ({described(small.design)}) has {m[NADIR.key]:.3f} Hz "
+        f"with {m[CAPACITOR.key]:.3g} mF, where {FR.name} needs {_or_none(own)} (energy lost {m[ENERGY.key]:.1f} %, "
+        f"DEL {m[FATIGUE.key]:.3f} MN m)."
     )
     return [text]
 
