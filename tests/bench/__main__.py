@@ -1,8 +1,9 @@
-"""`make bench`: three tables of ratios, each measured in this one run.
+"""`make bench`: tables of ratios, each measured in this one run.
 
 (a) the turbulent scenario against a bare IDA + KLU program on the same condensed equations;
 (b) the farm against CasADi's `idas`, with and without JIT, for N = 1, 10, 100 turbines, building apart from solving;
-(c) building and time per turbine-step for N = 1, 10, 100, 1000 turbines, and the way from the YAML to the first row.
+(c) building and time per turbine-step for N = 1, 10, 100, 1000 turbines, and the way from the YAML to the first row;
+(d) a day of 20 Hz wind and a year of measured wind against both, and what statistics, rows, checkpoints, events cost.
 
 Machines are noisy: runs of both sides alternate, the smallest time of each counts.
 """
@@ -23,6 +24,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from tests.bench.long_runs import long_runs
 from tests.bench.peers import BareProgram, CasadiIdas, NotCompiledError, Wind
 from tests.support.case import SCENARIOS, Case, open_case
 
@@ -228,8 +230,9 @@ def scaling(counts: list[int], seconds: dict[int, float]) -> dict[str, Any]:
 def main() -> None:
     """Run the benchmarks named, all by default."""
     parser = argparse.ArgumentParser(prog="make bench ARGS=...", description=__doc__.splitlines()[0] if __doc__ else "")
-    parser.add_argument("parts", nargs="*", default=["a", "b", "c"], help="a, b, c (default: all)")
+    parser.add_argument("parts", nargs="*", default=["a", "b", "c", "d"], help="a, b, c, d (default: all)")
     parser.add_argument("--hours", type=float, default=1.0, help="simulated hours of (a)")
+    parser.add_argument("--days", type=float, default=1.0, help="simulated days of (d)")
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument("--most", type=int, default=100, help="largest N of (b)")
     parser.add_argument("--jit-limit", type=int, default=1800, help="seconds that CasADi's C code may compile in (b)")
@@ -245,6 +248,8 @@ def main() -> None:
             figures["casadi"] = casadi(counts, {1: 600.0, 10: 300.0, 100: 60.0}, arguments.repeats, arguments.jit_limit)
         if "c" in arguments.parts:
             figures["scaling"] = scaling([1, 10, 100, 1000], {1: 600.0, 10: 600.0, 100: 60.0, 1000: 20.0})
+        if "d" in arguments.parts:
+            figures["long_runs"] = long_runs(min(arguments.repeats, 3), Path(folder), arguments.days)
     if arguments.json:
         arguments.json.write_text(json.dumps(figures, indent=2) + "\n")
 

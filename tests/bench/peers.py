@@ -135,6 +135,7 @@ class CasadiIdas:
             "max_num_steps": 100_000_000,
             "suppress_algebraic": True,
             "calc_ic": True,
+            "first_time": min(until, 1.0),  # what IDACalcIC takes for the size of a step: not the whole run
         }
         if jit:
             # For a hundred turbines gcc takes more than 23 GB, at -O0 too; it must not take the machine's last.
