@@ -42,9 +42,9 @@ def export_controller(
     if scenario is None:
         if overrides:
             raise GustformError("GF2070", "--set changes a scenario, and none is given", hint="NAME SCENARIO.yaml")
-        block = _default_block(name)
+        block = default_block(name)
     else:
-        block = _block_of_scenario(name, scenario, overrides)
+        block = block_of_scenario(name, scenario, overrides)
     made = program(discretise(block, h, Method(method)))
     write_folder(made, default_prefix(block.name) if prefix is None else prefix, double, out)
     if not report:
@@ -68,7 +68,8 @@ def _period(text: str) -> float:
     return seconds
 
 
-def _default_block(name: str) -> Block:
+def default_block(name: str) -> Block:
+    """A control with the parameters of the default turbine. GF2070."""
     known = controls()
     if name not in known:
         raise GustformError(
@@ -78,7 +79,8 @@ def _default_block(name: str) -> Block:
     return controller_block(turbine.control, turbine.pitch)
 
 
-def _block_of_scenario(name: str, scenario: Path, overrides: Sequence[str]) -> Block:
+def block_of_scenario(name: str, scenario: Path, overrides: Sequence[str]) -> Block:
+    """The control of a turbine of a scenario, with the set points and states of its steady state. GF2047."""
     from gustform_cli.design import only_turbine
     from gustform_cli.model import link, load, placed, print_warnings
     from gustform_codegen.initial import steady_state

@@ -123,7 +123,7 @@ def _inside(value: str, signal: Signal) -> str:
     infinite = float("inf")
     low = literal(signal.low) if signal.low > -infinite else "-REAL_MAX"
     high = literal(signal.high) if signal.high < infinite else "REAL_MAX"
-    return f"{value} {'>' if signal.exclusive else '>='} {low} && {value} <= {high}"
+    return f"({value} {'>' if signal.exclusive else '>='} {low}) && ({value} <= {high})"
 
 
 def _indent(lines: list[str]) -> list[str]:
@@ -177,6 +177,7 @@ def source(program: Program, names: Names) -> str:
 
 #include <float.h>
 #include <math.h>
+#include <stdbool.h>
 
 typedef {p}_real real;
 
@@ -188,9 +189,9 @@ typedef {p}_real real;
 #define REAL_MAX FLT_MAX
 #endif
 
-static int finite_real(real x)
+static bool finite_real(real x)
 {{
-    return x >= -REAL_MAX && x <= REAL_MAX; /* false for NaN */
+    return (x >= -REAL_MAX) && (x <= REAL_MAX); /* false for NaN */
 }}
 
 /* `bit` if an input is rejected, else 0. */
@@ -200,9 +201,11 @@ static uint32_t check(real x, real low, real high, uint32_t bit, uint32_t *error
     if (!finite_real(x)) {{
         *errors |= {upper}_INPUT_NOT_FINITE;
         rejected = bit;
-    }} else if (x < low || x > high) {{
+    }} else if ((x < low) || (x > high)) {{
         *errors |= {upper}_INPUT_RANGE;
         rejected = bit;
+    }} else {{
+        /* a good sample */
     }}
     return rejected;
 }}
@@ -217,6 +220,8 @@ static real kept(real x, real low, real high, uint32_t *errors)
     }} else if (x > high) {{
         result = high;
         *errors |= {upper}_OUTPUT_LIMITED;
+    }} else {{
+        /* within its range */
     }}
     return result;
 }}
@@ -233,15 +238,15 @@ static void advance(const {p}_context *c, real *memory, {p}_outputs *out)
 @advance@
 }}
 
-static int parameters_allowed(const {p}_parameters *p)
+static bool parameters_allowed(const {p}_parameters *p)
 {{
 @allowed@
 }}
 
 uint32_t {p}_recalibrate({p}_context *c)
 {{
-    real constant[{max(program.n_constants, 1)}] = {{ R(0.0) }};
-    int good = parameters_allowed(&c->p);
+    real constant[{max(program.n_constants, 1)}] = {{ 0 }};
+    bool good = parameters_allowed(&c->p);
     int k = 0;
 
     if (good) {{
@@ -289,9 +294,9 @@ uint32_t {p}_step({p}_context *c)
 
 @checks@
     if (faulty == 0U) {{
-        real memory[{max(n, 1)}] = {{ R(0.0) }};
+        real memory[{max(n, 1)}] = {{ 0 }};
         {p}_outputs out = c->out;
-        int good = 0;
+        bool good = false;
         int k = 0;
 
         advance(c, memory, &out);
@@ -313,9 +318,9 @@ uint32_t {p}_step({p}_context *c)
     return errors;
 }}
 """
-    allowed = [f"int good = {_inside('p->' + parameters[0].name, parameters[0])};"] if parameters else ["(void)p;"]
+    allowed = [f"bool good = {_inside('p->' + parameters[0].name, parameters[0])};"] if parameters else ["(void)p;"]
     allowed += [f"good = good && {_inside('p->' + s.name, s)};" for s in parameters[1:]]
-    allowed.append("return good;" if parameters else "return 1;")
+    allowed.append("return good;" if parameters else "return true;")
     pieces = {
         "prepare": _indent(prepare),
         "advance": _indent(advance),
