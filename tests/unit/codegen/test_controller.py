@@ -119,7 +119,7 @@ def test_a_denormal_is_a_number_like_others(name: str, compiled: dict[tuple[str,
 def test_limits_hold_over_random_samples(name: str, compiled: dict[tuple[str, bool], Compiled]) -> None:
     one = compiled[name, False]
     step = one.program.step
-    block, n = step.block, 100_000
+    block, n = step.block, 1_000_000
     rng = np.random.default_rng(6)
     low, high = (np.array([getattr(s, end) for s in block.inputs]) for end in ("low", "high"))
     inputs = low + (high - low) * rng.random((n, len(block.inputs)))
