@@ -160,7 +160,7 @@ def start_long_run(out: Path) -> subprocess.Popen[str]:
     )  # fmt: skip
     deadline = time.monotonic() + 60.0
     part = out / "result.nc.part"
-    while not (part.exists() and part.stat().st_size > 600_000):  # two blocks of 17 x 4096 values, and another one begun
+    while not (part.exists() and part.stat().st_size > 600_000):  # two blocks of 17 x 4096 values, and more
         assert process.poll() is None, process.communicate()
         assert time.monotonic() < deadline
         time.sleep(0.05)
