@@ -289,6 +289,24 @@ def test_the_description_names_every_signal() -> None:
     assert stable_id("inputs", "v_dc") == found["inputs"][0]["id"] == 21071  # for ever
 
 
+@pytest.mark.parametrize("double", [False, True])
+def test_the_a2l_file_has_the_addresses_of_the_context(double: bool, tmp_path: Path) -> None:
+    made = program_of("DualPort")
+    write_folder(made, PREFIX, double, tmp_path)
+    text = (tmp_path / f"{PREFIX}.a2l").read_text()
+    measured = re.findall(r"/begin MEASUREMENT (\S+) .* ECU_ADDRESS (0x[0-9A-F]+) /end MEASUREMENT", text)
+    adjusted = re.findall(r"/begin CHARACTERISTIC (\S+) .* VALUE (0x[0-9A-F]+) number .* /end CHARACTERISTIC", text)
+    assert len(measured) == 7 + 5 + 2
+    assert len(adjusted) == len(made.step.parameters)
+    assert text.count("/begin") == text.count("/end")
+    checks = [f"offsetof(ctl_context, {name}) == {address}" for name, address in [*measured, *adjusted]]
+    code = "\n".join(["#include <stddef.h>", '#include "ctl.h"', *[f'_Static_assert({c}, "{c}");' for c in checks], ""])
+    (tmp_path / "offsets.c").write_text(code)
+    command = [find_compiler().path, "-std=c11", "-fsyntax-only", str(tmp_path / "offsets.c")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
 @pytest.mark.parametrize("prefix", ["", "9a", "a-b", "Ab", "float", "a" * 40, "a;b"])
 def test_a_prefix_that_is_no_name_is_refused(prefix: str) -> None:
     with pytest.raises(GustformError, match="GF2071"):

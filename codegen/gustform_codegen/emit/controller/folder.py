@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from gustform.language.errors import GustformError
+from gustform_codegen.emit.controller.a2l import a2l
 from gustform_codegen.emit.controller.block import Signal
 from gustform_codegen.emit.controller.c_files import ERRORS, Names, header, source
 from gustform_codegen.emit.controller.description import as_json
@@ -51,6 +52,7 @@ def files(program: Program, prefix: str, double: bool) -> dict[str, str]:
         f"{prefix}.h": header(program, names),
         f"{prefix}.c": source(program, names),
         f"{prefix}.json": as_json(program, names),
+        f"{prefix}.a2l": a2l(program, names),
         f"test_{prefix}.c": host_test(program, names),
         "vectors.h": vectors_header(inputs, outputs),
         "CMakeLists.txt": _cmake(prefix),
