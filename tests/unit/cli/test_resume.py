@@ -104,7 +104,8 @@ def test_killed_at_random_moments(tmp_path: Path, whole: tuple[Path, float], see
             break
         if list(tmp_path.glob("*.checkpoint")):
             words = command("--resume", tmp_path)
-    assert killed == 3 or process.returncode == 0
+    else:
+        pytest.fail("forty starts, and none of them came to the end")
     assert_same(tmp_path, whole[0])
 
 
