@@ -134,18 +134,35 @@ def _draw_panel(
         axis.legend(loc="best")
 
 
+_HOURS_FROM, _DAYS_FROM = 2.5 * 3600.0, 4.0 * 86_400.0  # s
+
+
+def _unit_of_time(span: float) -> tuple[str, float]:
+    """Seconds, hours or days, and how many seconds they have."""
+    if span < _HOURS_FROM:
+        return "s", 1.0
+    return ("h", 3600.0) if span < _DAYS_FROM else ("d", 86_400.0)
+
+
 def _name_time(axis: Axes, span: float) -> None:
-    """Seconds, or hours where the run is long; `span` in s."""
+    """The axis of time; `span` in s."""
     from matplotlib.ticker import FuncFormatter, MultipleLocator
 
-    if span < 2.5 * 3600.0:
-        axis.set_xlabel("time (s)")
+    unit, seconds = _unit_of_time(span)
+    axis.set_xlabel(f"time ({unit})")
+    if seconds == 1.0:
         return
-    hours = span / 3600.0
-    every = next((h for h in (0.5, 1, 2, 3, 6, 12, 24, 48, 120, 240, 480, 720) if hours / h <= 9), hours / 8)
-    axis.xaxis.set_major_locator(MultipleLocator(3600.0 * every))
-    axis.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value / 3600.0:g}"))
-    axis.set_xlabel("time (h)")
+    length = span / seconds
+    steps = (0.5, 1, 2, 3, 6, 12, 24) if unit == "h" else (0.5, 1, 2, 5, 10, 20, 50, 100, 200)
+    every = next((step for step in steps if length / step <= 9), length / 8)
+    axis.xaxis.set_major_locator(MultipleLocator(seconds * every))
+    axis.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value / seconds:g}"))
+
+
+def _moment(time: float, span: float, digits: int) -> str:
+    """A time on the axis, in its unit."""
+    unit, seconds = _unit_of_time(span)
+    return f"{time:.{digits}f} s" if seconds == 1.0 else f"{time / seconds:.2f} {unit}"
 
 
 def _keep_height(axis: Axes, least: float) -> None:
@@ -203,11 +220,13 @@ def _mark_frequency(axis: Axes, run: RunData) -> None:
         return
     low, high = axis.get_ylim()
     axis.set_ylim(low - 0.1 * (high - low), high)  # room for the text below the curve
-    _point_out(axis, at, nadir, f"nadir {nadir:.3f} Hz at {at:.1f} s")
+    span = run.time[-1] - run.time[0]
+    word = "nadir" if run.json("events") else "lowest"  # nothing that it would be the answer to
+    _point_out(axis, at, nadir, f"{word} {nadir:.3f} Hz at {_moment(at, span, 1)}")
     settled = figures.get("settle_hz")
     if settled is not None and run.attribute("status") == "completed" and still(run, WIND):
         time = min(begin + SETTLE_AFTER, run.time[-1])
-        _point_out(axis, time, settled, f"{settled:.3f} Hz at {time:.0f} s")
+        _point_out(axis, time, settled, f"{settled:.3f} Hz at {_moment(time, span, 0)}")
 
 
 def _point_out(axis: Axes, time: float, value: float, text: str) -> None:

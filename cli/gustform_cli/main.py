@@ -89,11 +89,13 @@ def check(
     with guarded():
         from gustform_cli.model import link, load, print_warnings
         from gustform_cli.model_report import as_json, as_text
+        from gustform_cli.statistics import plan
         from gustform_codegen.report import model_report
 
         assembled = load(scenario, overrides or [])
         print_warnings(assembled)
         model = link(assembled)
+        plan(model)  # whether its statistics can be made
         report = model_report(model.built.linked)
         print(as_json(report, model) if json else as_text(report, model))
         if model_file is not None:

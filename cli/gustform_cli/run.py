@@ -191,9 +191,9 @@ class Run:
             writer.abandon()
 
     def _finish(self, writer: ResultWriter, summary: Summary) -> Path:
-        found = self.statistics
-        write = None if found is None else lambda file: write_statistics(file, found)
-        file = writer.finish(summary.status, summary.as_dict(), write)
+        file = writer.finish(
+            summary.status, summary.as_dict(), lambda file: write_statistics(file, self.statistics, summary.events)
+        )
         if summary.status == "completed":  # all others can be gone on with
             discard(file)
         return file

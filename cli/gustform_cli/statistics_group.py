@@ -5,6 +5,7 @@ Variables stand over `channel`, and over `turbine` where they belong to one; the
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,13 +20,32 @@ GROUP = "statistics"
 WELCH = "Welch: Hann window, half overlap, mean of each segment taken off, one-sided density"
 
 
-def write_statistics(file: h5py.File, found: Report) -> None:
-    """Add the group. Nothing is added where there are no statistics."""
+# Of a grid event: its key in summary.json and the variable, unit and sentence here.
+_EVENT = {
+    "nadir_hz": ("nadir", "Hz", "lowest grid frequency after the event"),
+    "nadir_time_s": ("nadir_time", "s", "when that was"),
+    "peak_hz": ("peak", "Hz", "highest grid frequency after the event"),
+    "peak_time_s": ("peak_time", "s", "when that was"),
+    "rocof_hz_per_s": ("rocof", "Hz/s", "mean rate of change over the first 100 ms"),
+    "settle_hz": ("settle", "Hz", "grid frequency at the end of the window"),
+    "settling_time_s": ("settling_time", "s", "from the event until it stays near that"),
+}
+
+
+def write_statistics(file: h5py.File, found: Report | None, events: Sequence[Mapping[str, Any]] = ()) -> None:
+    """Add the group. Nothing is added where there are neither statistics nor grid events."""
+    if found is not None and found.channels:
+        group = _Group(file.create_group(GROUP, track_order=True))
+        _channels(group, found)
+        _turbines(group, found)
+        _events(group, events)
+    elif events:
+        _events(_Group(file.create_group(GROUP, track_order=True)), events)
+
+
+def _channels(group: _Group, found: Report) -> None:
     from gustform_runtime import RAINFLOW
 
-    if not found.channels:
-        return
-    group = _Group(file.create_group(GROUP, track_order=True))
     plan, channels = found.plan, found.channels
     group.attribute("every_seconds", plan.every)
     group.attribute("start_seconds", plan.start)
@@ -47,7 +67,6 @@ def write_statistics(file: h5py.File, found: Report) -> None:
     if channels[0].cycles is not None:
         group.attribute("rainflow", RAINFLOW)
         _cycles(group, found)
-    _turbines(group, found)
 
 
 def _histograms(group: _Group, found: Report) -> None:
@@ -108,6 +127,16 @@ def _turbines(group: _Group, found: Report) -> None:
             times[turbines.index(at.turbine), names.index(at.limit.name)] = at.seconds
     group.texts("limit", names, "limit; summary.json says when a turbine stands at it")
     group.add("time_at_limit", times, "time at each limit", over=("turbine", "limit"), units="s")
+
+
+def _events(group: _Group, events: Sequence[Mapping[str, Any]]) -> None:
+    if not events:
+        return
+    group.scale("event", np.array([event["at_s"] for event in events]), "moment of the grid event", units="s")
+    for key, (name, unit, text) in _EVENT.items():
+        values = [event[key] for event in events]
+        numbers = np.array([np.nan if value is None else value for value in values])
+        group.add(name, numbers, text, over=("event",), units=unit)
 
 
 class _Group:

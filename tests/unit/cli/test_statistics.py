@@ -164,6 +164,9 @@ def test_statistics_do_not_depend_on_what_is_stored(
     for name, value in mine.items():
         assert value == (pytest.approx(theirs[name], rel=1e-12) if name != "set" else theirs[name]), name
     assert mine["rocof_hz_per_s"] < -0.1
+    event = run[2].sel(event=60.0)
+    assert event["nadir"].item() == theirs["nadir_hz"]
+    assert event["settling_time"].item() == theirs["settling_time_s"]
 
 
 def test_statistics_begin_where_they_are_told(tmp_path: Path) -> None:
@@ -212,12 +215,11 @@ def test_each_turbine_of_a_farm_has_its_own(tmp_path: Path) -> None:
     ],
 )  # fmt: skip
 def test_what_cannot_be_asked_for(tmp_path: Path, change: str, code: str, text: str) -> None:
-    result = CliRunner().invoke(
-        app, ["simulate", str(TURBULENT), "--out", str(tmp_path / "out"), "--no-figure", "--set", change]
-    )
-    assert result.exit_code == 2
-    assert code in result.stderr
-    assert text in result.stderr
+    for command in (["check"], ["simulate", "--out", str(tmp_path / "out"), "--no-figure"]):
+        result = CliRunner().invoke(app, [*command, str(TURBULENT), "--set", change])
+        assert result.exit_code == 2
+        assert code in result.stderr
+        assert text in result.stderr
     assert not (tmp_path / "out" / "result.nc").exists()
 
 
