@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -23,7 +25,7 @@ DAY = 86_400.0
 )
 def test_the_axis_has_a_unit_that_fits(span: float, label: str, ticks: list[str] | None) -> None:
     figure = Figure()
-    canvas = FigureCanvasAgg(figure)
+    canvas: Any = FigureCanvasAgg(figure)  # untyped in some versions
     axis = figure.subplots()
     axis.set_xlim(0.0, span)
     _name_time(axis, span)
