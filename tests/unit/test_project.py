@@ -410,6 +410,14 @@ def test_documented_commands_run(document: Path, tmp_path: Path) -> None:
         assert result.returncode == 0, f"{command}\n{result.stdout}\n{result.stderr}"
 
 
+def test_the_readme_shows_the_code_that_runs() -> None:
+    """Every line of its component but the docstring, which is shortened, stands in the source in the same order."""
+    block = re.findall(r"^```python\n(.*?)^```", (ROOT / "README.md").read_text(), flags=re.DOTALL | re.MULTILINE)[0]
+    source = iter((ROOT / "library/gustform/electrical/dc_link.py").read_text().splitlines())
+    for line in block.splitlines():
+        assert '"""' in line or line in source, line
+
+
 def test_the_tutorial_does_what_it_says(tmp_path: Path) -> None:
     """Its Python blocks, one after the other, print what it shows as their output."""
     text = (ROOT / "docs" / "tutorial.md").read_text()
