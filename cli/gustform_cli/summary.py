@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from gustform.language.errors import GustformError
+from gustform_cli.writing import write_text
 
 # Counters of the runtime that everybody's summary has; zero when the run never began.
 _COUNTERS = (
@@ -33,14 +33,7 @@ SOLVER_FIGURES = (*_COUNTERS, *_MORE)
 
 def write_summary(summary: Summary, folder: Path) -> Path:
     """Write summary.json into a folder; GF7001 if it cannot be written."""
-    file = folder / "summary.json"
-    try:
-        file.write_text(json.dumps(summary.as_dict(), indent=2) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise GustformError(
-            "GF7001", f"{str(file)!r} cannot be written; {error.strerror or error}", hint="--out with another folder"
-        ) from None
-    return file
+    return write_text(folder / "summary.json", json.dumps(summary.as_dict(), indent=2) + "\n")
 
 
 def solver_figures(statistics: Mapping[str, int | float]) -> dict[str, int]:

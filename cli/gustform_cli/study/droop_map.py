@@ -14,11 +14,11 @@ import numpy as np
 
 from gustform.analysis.droop_map import FREQUENCY_RESERVE, DroopMap
 from gustform.analysis.droop_map import droop_map as solve
-from gustform.language.errors import GustformError
 from gustform.turbines.pmsg_turbine import PmsgTurbine
 from gustform_cli.figures import DARK, GREY, STYLE
 from gustform_cli.png import save
 from gustform_cli.result import prepare_folder
+from gustform_cli.writing import write_text, writing
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -56,10 +56,7 @@ def droop_map(out: Path) -> Study:
     files = {"figure": out / FIGURE, "table": out / TABLE, "infeasible": out / INFEASIBLE, "summary": out / SUMMARY}
     summary = as_summary(found) | {"paths": {name: str(path) for name, path in files.items()}}
     _write_tables(found, files)
-    try:
-        files["summary"].write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise _not_written(files["summary"], error) from None
+    write_text(files["summary"], json.dumps(summary, indent=2) + "\n")
     draw(found, files["figure"])
     return Study(found, summary, files)
 
@@ -107,17 +104,8 @@ def _write_tables(found: DroopMap, files: dict[str, Path]) -> None:
     missing = [("eta", "wind (m/s)", "code", "reason")]
     missing += [(f"{p.eta:g}", f"{p.wind:g}", p.code, p.reason) for p in found.infeasible]
     for path, table in ((files["table"], rows), (files["infeasible"], missing)):
-        try:
-            with path.open("w", encoding="utf-8", newline="") as file:
-                csv.writer(file, lineterminator="\n").writerows(table)
-        except OSError as error:
-            raise _not_written(path, error) from None
-
-
-def _not_written(path: Path, error: OSError) -> GustformError:
-    return GustformError(
-        "GF7001", f"{str(path)!r} cannot be written; {error.strerror}", hint="--out with another folder"
-    )
+        with writing(path), path.open("w", encoding="utf-8", newline="") as file:
+            csv.writer(file, lineterminator="\n").writerows(table)
 
 
 # ---- figure ---------------------------------------------------------------------------------------------------------

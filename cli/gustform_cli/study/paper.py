@@ -20,6 +20,7 @@ from gustform_cli.study import published
 from gustform_cli.study.droop_map import draw as draw_droop_map
 from gustform_cli.study.paper_cases import CASES, GFM_FR, TURBINE, WINDS, Case, build, run
 from gustform_cli.study.paper_report import closing, report
+from gustform_cli.writing import write_text
 from gustform_codegen.modes import modes
 
 CASES_FOLDER, SUMMARY, REPORT = "cases", "summary.json", "report.md"
@@ -99,8 +100,8 @@ def paper(out: Path, fidelity: str, jobs: int, interrupt: Interrupt) -> Study:
     rtol = built[0].model.assembled.scenario.run.rtol
     text = report(fidelity, rtol, summary["frequency"], numbers, stability, droop, figures)
     paths = {
-        "report": _write(out / REPORT, text),
-        "summary": _write(out / SUMMARY, json.dumps(summary, indent=2) + "\n"),
+        "report": str(write_text(out / REPORT, text)),
+        "summary": str(write_text(out / SUMMARY, json.dumps(summary, indent=2) + "\n")),
         "cases": str(cases),
         **{file.stem: str(file) for file in figures.values()},
     }
@@ -127,13 +128,3 @@ def _raise_failures(ended: Mapping[Case, Ended]) -> None:
     ]
     if failures:
         raise ErrorList(failures)
-
-
-def _write(file: Path, text: str) -> str:
-    try:
-        file.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise GustformError(
-            "GF7001", f"{str(file)!r} cannot be written; {error.strerror or error}", hint="--out with another folder"
-        ) from None
-    return str(file)

@@ -23,11 +23,11 @@ from numpy.typing import NDArray
 
 from gustform.analysis import theorem
 from gustform.electrical.synchronous_generator import SynchronousGenerator
-from gustform.language.errors import GustformError
 from gustform.turbines.pmsg_turbine import PmsgTurbine
 from gustform_cli.new import SCENARIOS
 from gustform_cli.result import prepare_folder
 from gustform_cli.study.variants import Variants
+from gustform_cli.writing import write_text
 from gustform_codegen.linear import LinearSystem
 from gustform_codegen.modes import CONSTANT, REFERENCE, modes
 
@@ -126,7 +126,7 @@ def stability(out: Path, seed: int = 1) -> Study:
         "paths": {name: str(path) for name, path in files.items()},
     }
     _write_tables(sweeps, files)
-    _write(files["summary"], json.dumps(summary, indent=2) + "\n")
+    write_text(files["summary"], json.dumps(summary, indent=2) + "\n")
     say("figure")
     from gustform_cli.study.stability_figure import draw
 
@@ -314,15 +314,6 @@ def _pairs(values: ComplexArray) -> list[list[float]]:
     return [_pair(value) for value in sorted(values, key=lambda v: (-v.real, abs(v.imag), -v.imag))]
 
 
-def _write(path: Path, text: str) -> None:
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise GustformError(
-            "GF7001", f"{str(path)!r} cannot be written; {error.strerror or error}", hint="--out with another folder"
-        ) from None
-
-
 def _write_tables(sweeps: Sequence[Sweep], files: dict[str, Path]) -> None:
     import io
 
@@ -337,7 +328,7 @@ def _write_tables(sweeps: Sequence[Sweep], files: dict[str, Path]) -> None:
                     [s.key, s.unit, c.model, f"{value:.8g}", f"{e.real:.8g}", f"{abs(e.imag):.8g}", f"{frequency:.6g}",
                      "yes" if e.real < 0.0 else "no"]
                 )  # fmt: skip
-    _write(files["sweeps"], text.getvalue())
+    write_text(files["sweeps"], text.getvalue())
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(["parameter", "unit", "model", "from", "to", "stable"])
@@ -345,7 +336,7 @@ def _write_tables(sweeps: Sequence[Sweep], files: dict[str, Path]) -> None:
         for c in s.curves:
             for low, high, stable in _ranges(c):
                 rows.writerow([s.key, s.unit, c.model, f"{low:.6g}", f"{high:.6g}", "yes" if stable else "no"])
-    _write(files["limits"], text.getvalue())
+    write_text(files["limits"], text.getvalue())
 
 
 def _ranges(curve: Curve) -> list[tuple[float, float, bool]]:

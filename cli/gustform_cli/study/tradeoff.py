@@ -22,6 +22,7 @@ from gustform_cli.study.tradeoff_report import report
 from gustform_cli.study.tradeoff_results import OBJECTIVES, Row, compromise, correlations, rows
 from gustform_cli.study.tradeoff_tables import write_designs, write_runs
 from gustform_cli.versions import versions
+from gustform_cli.writing import write_text
 
 WIND, CAPACITOR = "wind", "capacitor"
 FIGURE, REPORT, SUMMARY = "tradeoff.png", "report.md", "summary.json"
@@ -101,8 +102,8 @@ def tradeoff(out: Path, settings: Settings, workers: int, interrupt: Interrupt) 
     write_runs(paths["runs"], chosen, winds, wind.records)
     write_designs(paths["designs"], found)
     write_designs(paths["pareto"], (row for row in found if row.front))
-    _write(paths["report"], report(found, objectives, winds, settings.seeds, settings.steps_per_day))
-    _write(paths["summary"], json.dumps(summary, indent=2) + "\n")
+    write_text(paths["report"], report(found, objectives, winds, settings.seeds, settings.steps_per_day))
+    write_text(paths["summary"], json.dumps(summary, indent=2) + "\n")
     from gustform_cli.study.tradeoff_figure import draw  # a second of imports
 
     draw(found, objectives, settings.steps_per_day, paths["figure"])
@@ -147,12 +148,3 @@ def _finite(tree: Any) -> Any:
     if isinstance(tree, Mapping):
         return {key: _finite(value) for key, value in tree.items()}
     return tree if not isinstance(tree, float) or math.isfinite(tree) else None
-
-
-def _write(file: Path, text: str) -> None:
-    try:
-        file.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise GustformError(
-            "GF7001", f"{str(file)!r} cannot be written; {error.strerror or error}", hint="--out with another folder"
-        ) from None

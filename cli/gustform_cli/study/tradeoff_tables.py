@@ -7,10 +7,10 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from gustform.language.errors import GustformError
 from gustform_cli.study.tradeoff_design import RANGES, Design
 from gustform_cli.study.tradeoff_results import MEASURES, Row
 from gustform_cli.sweep.store import Record
+from gustform_cli.writing import writing
 
 _DIGITS = 7
 
@@ -64,12 +64,7 @@ def _numbers(values: Iterable[float]) -> list[str]:
 
 
 def _write(file: Path, head: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    try:
-        with file.open("w", encoding="utf-8", newline="") as stream:
-            writer = csv.writer(stream, lineterminator="\n")
-            writer.writerow(head)
-            writer.writerows(rows)
-    except OSError as error:
-        raise GustformError(
-            "GF7001", f"{str(file)!r} cannot be written; {error.strerror or error}", hint="--out with another folder"
-        ) from None
+    with writing(file), file.open("w", encoding="utf-8", newline="") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(head)
+        writer.writerows(rows)

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, TypeVar
 
-from gustform.language.errors import GustformError
 from gustform_cli.interrupt import Interrupt
 from gustform_cli.result import prepare_folder
 from gustform_cli.sweep import case
@@ -21,6 +20,7 @@ from gustform_cli.sweep.local import LocalPool, Lost
 from gustform_cli.sweep.plan import Case, Plan, plan
 from gustform_cli.sweep.store import Record, Store
 from gustform_cli.sweep.table import write_table
+from gustform_cli.writing import writing
 
 _TABLE_EVERY = 60.0  # s between tables while running; the journal has everything in between
 
@@ -173,10 +173,6 @@ def _outcome(task: Task, result: Outcome | Lost) -> Outcome:
 
 def _keep(data: bytes, file: Path) -> None:
     part = file.with_name(f"{file.name}-part")
-    try:
+    with writing(file):
         part.write_bytes(data)
         part.replace(file)
-    except OSError as error:
-        raise GustformError(
-            "GF7001", f"{str(file)!r} cannot be written; {error.strerror or error}", hint="--out with another folder"
-        ) from None

@@ -15,12 +15,12 @@ from fnmatch import translate
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from gustform.language.errors import GustformError
 from gustform_cli.quantity import conversion, split_quantity
 from gustform_cli.sweep.case import RUNS, result_name
 from gustform_cli.sweep.plan import Plan
 from gustform_cli.sweep.store import Record
 from gustform_cli.versions import versions
+from gustform_cli.writing import writing
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -43,14 +43,10 @@ def write_table(plan: Plan, records: Mapping[str, Record], units: Mapping[str, s
 
     file = folder / TABLE
     part = folder / f"{TABLE}.part"
-    try:
+    with writing(file):
         (folder / CAMPAIGN).write_text(plan.campaign_text, encoding="utf-8")
         pq.write_table(_table(plan, records, units, folder), part, compression="zstd")
         part.replace(file)
-    except OSError as error:
-        raise GustformError(
-            "GF7001", f"{str(file)!r} cannot be written; {error.strerror or error}", hint="--out with another folder"
-        ) from None
     return file
 
 
