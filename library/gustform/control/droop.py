@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from gustform.control.grid_forming import GridForming
-from gustform.control.msc_dc_voltage import MscDcVoltage
-from gustform.language import Input, Parameter, Part, Variable
+from gustform.control.dc_voltage_held import DcVoltageHeld
+from gustform.language import Parameter, Variable
 
 
-class Droop(GridForming):
+class Droop(DcVoltageHeld):
     """Grid-forming droop control: the frequency falls with the power delivered.
 
         T_p d(P_f)/dt = P_gsc - P_f
@@ -22,20 +21,9 @@ class Droop(GridForming):
 
     T_p = Parameter("s", "time constant of the filter of the active power", default=0.05, above=0.0)
 
-    P_gsc = Input("pu", "active power out of the grid-side converter", start=0.5)
     P_filtered = Variable("pu", "filtered active power P_f", start=0.5)
-
-    dc_voltage = Part(
-        MscDcVoltage,
-        "DC voltage, held by the machine side",
-        v_dc_ref=lambda self: self.v_dc_ref,
-        P_max=lambda self: self.P_max,
-    )
 
     def equations(self) -> None:
         super().equations()
         self.eq(self.T_p * self.der(self.P_filtered), self.P_gsc - self.P_filtered)
         self.eq(self.omega_gsc, 1.0 + self.droop * (self.P_ref - self.P_filtered))
-        self.connect(self.dc_voltage.v_dc, self.v_dc)
-        self.connect(self.dc_voltage.omega_r, self.omega_r)
-        self.connect(self.P_msc, self.dc_voltage.P)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from gustform.control.grid_forming import GridForming
-from gustform.control.msc_dc_voltage import MscDcVoltage
-from gustform.language import Input, Parameter, Part, Variable
+from gustform.control.dc_voltage_held import DcVoltageHeld
+from gustform.language import Parameter, Variable
 
 
-class VirtualSynchronousMachine(GridForming):
+class VirtualSynchronousMachine(DcVoltageHeld):
     """Grid-forming control by the swing equation of a virtual machine.
 
         2 H d(omega_gsc)/dt = P* - P_gsc - (omega_gsc - 1)/m_p - D (omega_gsc - omega_f)
@@ -26,15 +25,7 @@ class VirtualSynchronousMachine(GridForming):
     D = Parameter("pu", "damping against the filtered frequency", default=100.0, min=0.0)
     T_f = Parameter("s", "time constant of the filter of the frequency", default=0.5, above=0.0)
 
-    P_gsc = Input("pu", "active power out of the grid-side converter", start=0.5)
     omega_f = Variable("pu", "filtered frequency", start=1.0)
-
-    dc_voltage = Part(
-        MscDcVoltage,
-        "DC voltage, held by the machine side",
-        v_dc_ref=lambda self: self.v_dc_ref,
-        P_max=lambda self: self.P_max,
-    )
 
     def equations(self) -> None:
         super().equations()
@@ -44,6 +35,3 @@ class VirtualSynchronousMachine(GridForming):
             self.P_ref - self.P_gsc - (omega - 1.0) / self.droop - self.D * (omega - self.omega_f),
         )
         self.eq(self.T_f * self.der(self.omega_f), omega - self.omega_f)
-        self.connect(self.dc_voltage.v_dc, self.v_dc)
-        self.connect(self.dc_voltage.omega_r, self.omega_r)
-        self.connect(self.P_msc, self.dc_voltage.P)
