@@ -16,6 +16,7 @@ import typer
 
 from gustform_cli.exits import DONE, FAILED, INTERRUPTED, USAGE, guarded
 from gustform_cli.export_app import export
+from gustform_cli.hil.app import hil
 from gustform_cli.study.app import study
 
 app = typer.Typer(
@@ -28,6 +29,7 @@ app = typer.Typer(
 )
 app.add_typer(study)
 app.add_typer(export)
+app.add_typer(hil)
 
 Scenario = Annotated[Path, typer.Argument(metavar="SCENARIO.yaml", help="scenario file; `gustform new` writes one")]
 Overrides = Annotated[
