@@ -9,8 +9,8 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gustform.language.errors import GustformError
 from gustform_cli.figures import BLUE, DARK, GREEN, GREY, ORANGE, RED, STYLE
+from gustform_cli.png import save
 from gustform_codegen.modes import CONSTANT, REFERENCE, Mode, Modes
 
 if TYPE_CHECKING:
@@ -50,13 +50,7 @@ def draw(modes: Modes, title: str, file: Path) -> Path:
         left.legend(handles, labels, title="most of it in", loc="upper right", fontsize=8, title_fontsize=8)
         verdict = "stable" if modes.stable else "NOT STABLE"
         canvas.suptitle(f"{title}: {verdict}", x=0.012, ha="left", fontsize=11.5, fontweight="bold")
-        try:
-            canvas.savefig(file, dpi=150)
-        except (OSError, ValueError) as error:
-            raise GustformError(
-                "GF7001", f"the figure {str(file)!r} cannot be written; {error}", hint="--out with another folder"
-            ) from None
-    return file
+        return save(canvas, file)
 
 
 def _component(state: str) -> str:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gustform.language.errors import GustformError
 from gustform_cli.figures import BLUE, DARK, GREEN, GREY, ORANGE, RED, STYLE
+from gustform_cli.png import save
 from gustform_cli.study.stability import Curve, Sweep
 
 if TYPE_CHECKING:
@@ -51,13 +51,7 @@ def draw(sweeps: Sequence[Sweep], file: Path) -> Path:
             "Where dual-port control loses stability: 8 m/s, 10 % curtailment", x=0.012, ha="left", fontsize=12,
             fontweight="bold",
         )  # fmt: skip
-        try:
-            canvas.savefig(file, dpi=150)
-        except (OSError, ValueError) as error:
-            raise GustformError(
-                "GF7001", f"the figure {str(file)!r} cannot be written; {error}", hint="--out with another folder"
-            ) from None
-    return file
+        return save(canvas, file)
 
 
 def _margin(axis: Axes, letter: str, sweep: Sweep) -> None:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from gustform.language.errors import GustformError, Place
 from gustform_cli.wind.clean import LOWEST_SPEED
+from gustform_cli.wind.reading import reading
 
 _BLOCK = 1 << 21  # bytes read at a time
 
@@ -144,12 +145,8 @@ class BoxWind:
         box, first = self._box, number * self._per_block
         planes = min(self._per_block, box.planes - first)
         place = Place(str(box.path))
-        try:
+        with reading(box.path):
             raw = np.fromfile(box.path, box.kind, planes * box.numbers, offset=box.offset + first * self._plane)
-        except OSError as error:
-            raise GustformError(
-                "GF2501", f"the wind file must be readable; {error.strerror or error}", place=place
-            ) from None
         check_size(box.path, box.offset + (first + planes) * self._plane, f"{first + planes} planes", place)
         speeds = np.tensordot(box.unpack(raw.reshape(planes, box.numbers)), self._weights, axes=2)
         wrong = np.flatnonzero(~np.isfinite(speeds))

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from gustform.language.errors import GustformError, Place
 from gustform_cli.errors import did_you_mean
+from gustform_cli.wind.reading import reading
 from gustform_cli.wind.stamps import NOT_A_TIME, Clock, Stamps, dated, nanoseconds, numbered, to_utc
 from gustform_cli.wind.table import Position, Rows
 
@@ -44,23 +45,17 @@ class Columns:
 @contextmanager
 def opened(path: Path) -> Iterator[IO[bytes]]:
     """The bytes of a file, unpacked if it is a .gz; GF2501 and GF2508 for what goes wrong, now or while reading."""
-    try:
-        with gzip.open(path, "rb") if path.suffix == ".gz" else path.open("rb") as stream:
-            yield stream  # type: ignore[misc]  # GzipFile reads like a file
-    except (gzip.BadGzipFile, EOFError, zlib.error) as error:
-        raise GustformError(
-            "GF2508",
-            f"the wind file must be a whole .gz; {str(error) or type(error).__name__}",
-            hint="copying it again",
-            place=Place(str(path)),
-        ) from None
-    except OSError as error:
-        raise GustformError(
-            "GF2501",
-            f"the wind file must be readable; {error.strerror or error}",
-            hint="the path relative to the scenario file",
-            place=Place(str(path)),
-        ) from None
+    with reading(path):
+        try:
+            with gzip.open(path, "rb") if path.suffix == ".gz" else path.open("rb") as stream:
+                yield stream  # type: ignore[misc]  # GzipFile reads like a file
+        except (gzip.BadGzipFile, EOFError, zlib.error) as error:
+            raise GustformError(
+                "GF2508",
+                f"the wind file must be a whole .gz; {str(error) or type(error).__name__}",
+                hint="copying it again",
+                place=Place(str(path)),
+            ) from None
 
 
 def whole_lines(stream: IO[bytes], path: Path, offset: int, line: int) -> Iterator[tuple[int, int, bytes]]:

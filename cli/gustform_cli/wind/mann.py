@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from gustform.language.errors import GustformError, Place
 from gustform_cli.wind.box import Box
 from gustform_cli.wind.clean import LOWEST_SPEED
+from gustform_cli.wind.reading import reading
 
 
 def mann_box(
@@ -25,15 +26,8 @@ def mann_box(
     """The box in a file of the longitudinal component. GF2501, GF2509 if the file has another size."""
     nx, ny, nz = shape
     dx, dy, dz = spacing
-    try:
+    with reading(path):
         size = path.stat().st_size
-    except OSError as error:
-        raise GustformError(
-            "GF2501",
-            f"the wind file must be readable; {error.strerror or error}",
-            hint="the path relative to the scenario file",
-            place=Place(str(path)),
-        ) from None
     if size != 4 * nx * ny * nz:
         planes, rest = divmod(size, 4 * ny * nz)
         raise GustformError(

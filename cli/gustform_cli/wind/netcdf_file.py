@@ -18,6 +18,7 @@ from gustform.language.errors import GustformError, Place
 from gustform_cli.errors import did_you_mean
 from gustform_cli.quantity import conversion
 from gustform_cli.wind.csv_file import Columns
+from gustform_cli.wind.reading import reading
 from gustform_cli.wind.stamps import Clock, Stamps, dated, nanoseconds, numbered, to_utc
 from gustform_cli.wind.table import Position, Rows
 
@@ -96,15 +97,8 @@ class NetcdfFile:
     def _open(self) -> h5py.File:
         import h5py
 
-        try:
-            with self.path.open("rb") as stream:
-                magic = stream.read(4)
-        except OSError as error:
-            raise self._wrong(
-                "GF2501",
-                f"the wind file must be readable; {error.strerror or error}",
-                "the path relative to the scenario file",
-            ) from None
+        with reading(self.path), self.path.open("rb") as stream:
+            magic = stream.read(4)
         if magic[:3] == b"CDF":
             raise self._wrong("GF2508", "the wind file must be netCDF-4; it is netCDF-3", "nccopy -k nc4 IN.nc OUT.nc")
         try:

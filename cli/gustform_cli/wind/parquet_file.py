@@ -12,6 +12,7 @@ import numpy as np
 from gustform.language.errors import GustformError, Place
 from gustform_cli.errors import did_you_mean
 from gustform_cli.wind.csv_file import Columns
+from gustform_cli.wind.reading import reading
 from gustform_cli.wind.stamps import NOT_A_TIME, Clock, Stamps, dated, numbered, to_utc
 from gustform_cli.wind.table import Position, Rows
 
@@ -80,23 +81,17 @@ class ParquetFile:
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        try:
-            # Buffered: pages are read as they are needed, not the columns of a row group at once.
-            return pq.ParquetFile(self.path, buffer_size=1 << 20, pre_buffer=False)
-        except pa.ArrowInvalid as error:
-            raise GustformError(
-                "GF2508",
-                f"the wind file must be a whole Parquet file; {str(error).splitlines()[0].rstrip('. ')}",
-                hint="format: with the kind of file it is",
-                place=Place(str(self.path)),
-            ) from None
-        except OSError as error:
-            raise GustformError(
-                "GF2501",
-                f"the wind file must be readable; {error.strerror or error}",
-                hint="the path relative to the scenario file",
-                place=Place(str(self.path)),
-            ) from None
+        with reading(self.path):
+            try:
+                # Buffered: pages are read as they are needed, not the columns of a row group at once.
+                return pq.ParquetFile(self.path, buffer_size=1 << 20, pre_buffer=False)
+            except pa.ArrowInvalid as error:
+                raise GustformError(
+                    "GF2508",
+                    f"the wind file must be a whole Parquet file; {str(error).splitlines()[0].rstrip('. ')}",
+                    hint="format: with the kind of file it is",
+                    place=Place(str(self.path)),
+                ) from None
 
     def _column(self, names: list[str], role: str, wanted: str | int) -> str:
         if isinstance(wanted, int) and 1 <= wanted <= len(names):
