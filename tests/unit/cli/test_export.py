@@ -25,8 +25,8 @@ def test_a_control_by_its_name(tmp_path: Path) -> None:
     assert done.stdout.rstrip().endswith("rig")
     assert "v_q         omega_gsc" in done.stdout
     assert {file.name for file in (tmp_path / "rig").iterdir()} == {
-        "gfl.c", "gfl.h", "gfl.json", "gfl.a2l", "test_gfl.c", "vectors.h", "CMakeLists.txt", "README.md",
-        "frequency.csv",
+        "gfl.c", "gfl.h", "gfl.json", "gfl.a2l", "test_gfl.c", "vectors.h",
+        "gust_controller.h", "gfl_interface.h", "gfl_interface.c", "CMakeLists.txt", "README.md", "frequency.csv",
     }  # fmt: skip
     found = json.loads((tmp_path / "rig" / "gfl.json").read_text())
     assert (found["period_s"], found["real"], found["name"]) == (5e-4, "double", "gfl")

@@ -12,6 +12,7 @@ from gustform_codegen.emit.controller.block import Signal
 from gustform_codegen.emit.controller.c_files import ERRORS, Names, header, source
 from gustform_codegen.emit.controller.description import as_json
 from gustform_codegen.emit.controller.host_test import host_test, vectors_header
+from gustform_codegen.emit.controller.interface import common_header, interface_header, interface_source
 from gustform_codegen.emit.controller.program import Program
 from gustform_codegen.emit.controller.vectors import recorded
 
@@ -51,6 +52,9 @@ def files(program: Program, prefix: str, double: bool) -> dict[str, str]:
     return {
         f"{prefix}.h": header(program, names),
         f"{prefix}.c": source(program, names),
+        "gust_controller.h": common_header(),
+        f"{prefix}_interface.h": interface_header(names),
+        f"{prefix}_interface.c": interface_source(program, names),
         f"{prefix}.json": as_json(program, names),
         f"{prefix}.a2l": a2l(program, names),
         f"test_{prefix}.c": host_test(program, names),
@@ -86,15 +90,22 @@ if(NOT CMAKE_BUILD_TYPE)
     set(CMAKE_BUILD_TYPE Release)
 endif()
 
-add_library({prefix} STATIC {prefix}.c)
+add_library({prefix} STATIC {prefix}.c {prefix}_interface.c)
 target_include_directories({prefix} PUBLIC ${{CMAKE_CURRENT_SOURCE_DIR}})
 # No fused multiply-add: the same bits on every machine.
 target_compile_options({prefix} PRIVATE -ffp-contract=off)
 target_link_libraries({prefix} PUBLIC m)
 
+# The same behind gust_controller_interface(), for a program that loads it.
+add_library({prefix}_library MODULE {prefix}.c {prefix}_interface.c)
+target_compile_definitions({prefix}_library PRIVATE GUST_CONTROLLER_LIBRARY)
+target_compile_options({prefix}_library PRIVATE -ffp-contract=off)
+target_link_libraries({prefix}_library PRIVATE m)
+set_target_properties({prefix}_library PROPERTIES PREFIX "" OUTPUT_NAME {prefix})
+
 enable_testing()
 foreach(real 0 1)
-    add_executable(test_{prefix}_${{real}} test_{prefix}.c {prefix}.c)
+    add_executable(test_{prefix}_${{real}} test_{prefix}.c {prefix}.c {prefix}_interface.c)
     target_compile_definitions(test_{prefix}_${{real}} PRIVATE {prefix.upper()}_DOUBLE=${{real}})
     target_compile_options(test_{prefix}_${{real}} PRIVATE -ffp-contract=off)
     target_link_libraries(test_{prefix}_${{real}} PRIVATE m)
@@ -140,6 +151,9 @@ def _readme(program: Program, names: Names) -> str:
         f"    command = c.out.{block.outputs[0].name};",
         "}",
         "```",
+        "",
+        f"A program that runs any controller takes `{p}_interface.h`: one table of signals and functions,",
+        f"`{p}_controller`, or `gust_controller_interface()` of the shared library `{p}.so`; see `gust_controller.h`.",
         "",
         "`cmake -S . -B build && cmake --build build && ctest --test-dir build` runs the recorded vectors in float and",
         f"in double. `{p}.json` has all of the tables below with stable ids.",
