@@ -7,7 +7,7 @@
 #
 #   --print    only print the line that installs everything, whether missing or not
 #   --python   the Python that the virtual environment is made from (default: python3)
-#   --tests    also what the tests need (cmocka)
+#   --tests    also what the tests need (cmocka, cppcheck, a compiler and an emulator for Cortex-M)
 set -euo pipefail
 
 print_only=no
@@ -25,7 +25,7 @@ done
 
 always=(build-essential cmake ninja-build libsundials-dev libsuitesparse-dev python3-venv)
 if [ "$tests" = yes ]; then
-    always+=(libcmocka-dev)
+    always+=(libcmocka-dev cppcheck gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm)
 fi
 if [ "$print_only" = yes ]; then
     echo "sudo apt-get install --no-install-recommends ${always[*]}"
@@ -75,6 +75,11 @@ have_header ida/ida.h && have_header sunlinsol/sunlinsol_klu.h || missing+=(libs
 have_header klu.h || missing+=(libsuitesparse-dev)
 if [ "$tests" = yes ]; then
     have_header cmocka.h || missing+=(libcmocka-dev)
+    have_program cppcheck || missing+=(cppcheck)
+    # The exported controllers on emulated Cortex-M boards.
+    have_program arm-none-eabi-gcc || missing+=(gcc-arm-none-eabi)
+    [ -n "$(arm-none-eabi-gcc -print-file-name=libc.a 2>/dev/null | grep /)" ] || missing+=(libnewlib-arm-none-eabi)
+    have_program qemu-system-arm || missing+=(qemu-system-arm)
 fi
 
 if [ ${#missing[@]} -eq 0 ]; then
