@@ -1,14 +1,14 @@
 """How long a frame can take on the wire: bits by ISO 11898-1:2015, stuffed as badly as data can make them.
 
-Classic frame, 11-bit identifier, s bytes: start 1, identifier 11, RTR, IDE, r0, DLC 4, data 8 s, CRC 15 are stuffed: after
-five equal bits comes an opposite one, and it counts towards the next five. So n bits get at most floor((n - 1)/4). CRC
-delimiter, acknowledge 2, end 7 and intermission 3 are not.
+Classic frame, 11-bit identifier, s bytes: start 1, identifier 11, RTR, IDE, r0, DLC 4, data 8 s, CRC 15 are stuffed:
+after five equal bits comes an opposite one, and it counts towards the next five; n bits get at most floor((n - 1)/4).
+CRC delimiter, acknowledge 2, end 7 and intermission 3 are not.
 
-FD frame: up to BRS (17 bits with an 11-bit identifier) at the nominal rate; ESI, DLC 4, data, and the CRC field at the data
-rate; CRC delimiter, acknowledge, end and intermission at the nominal rate again. Stuffed as above up to the end of
-the data. The CRC field has the stuff count (3 bits and parity) and a CRC of 17 bits, above 16 bytes 21, with a fixed stuff bit
-before it and after each fourth bit. The bits in which the rate changes count as slow ones, and as many stuff bits as fit
-into the slow part are counted there: never too short.
+FD frame: up to BRS (17 bits with an 11-bit identifier) at the nominal rate; ESI, DLC 4, data, and the CRC field at the
+data rate; CRC delimiter, acknowledge, end and intermission at the nominal rate again. Stuffed as above up to the end of
+the data. The CRC field has the stuff count (3 bits and parity) and a CRC of 17 bits, above 16 bytes 21, with a fixed
+stuff bit before it and after each fourth bit. The bits in which the rate changes count as slow ones, and as many stuff
+bits as fit into the slow part are counted there: never too short.
 """
 
 from __future__ import annotations

@@ -1,19 +1,19 @@
 """Worst-case response times on a CAN bus.
 
-R. I. Davis, A. Burns, R. J. Bril, J. J. Lukkien: Controller Area Network (CAN) schedulability analysis: refuted, revisited
-and revised. Real-Time Systems 35 (2007) 239-272. The bus is served by fixed priority without preemption. A frame waits for the
-longest one of lower priority that has just begun (blocking B), for all of higher priority that come until it begins, each up to
-J late, and for its own earlier instances: the first instance need not be the worst one, so every instance q of
-the busy period is looked at,
+R. I. Davis, A. Burns, R. J. Bril, J. J. Lukkien: Controller Area Network (CAN) schedulability analysis: refuted,
+revisited and revised. Real-Time Systems 35 (2007) 239-272. The bus is served by fixed priority without preemption. A
+frame waits for the longest one of lower priority that has just begun (blocking B), for all of higher priority that come
+until it begins, each up to J late, and for its own earlier instances: the first instance need not be the worst one, so
+every instance q of the busy period is looked at,
 
     w(q) = B + q C + E(w + C) + sum over higher priorities of ceil((w + J_k + tau)/T_k) C_k
     R = max over q of  J + w(q) - q T + C.
 
-tau is one bit: what is queued while a frame begins can still win. Errors on the bus, if any are reckoned with: at most one per
-`error_interval`, each of which costs an error frame (31 bits) and the longest frame it can have destroyed.
+tau is one bit: what is queued while a frame begins can still win. Errors on the bus, if any are reckoned with: at most
+one per `error_interval`, each of which costs an error frame (31 bits) and the longest frame it can have destroyed.
 
-All of it holds if each sender offers its most urgent frame first. Times are fractions of a second, exact: a ceiling must
-not hang on rounding.
+All of it holds if each sender offers its most urgent frame first. Times are fractions of a second, exact: a ceiling
+must not hang on rounding.
 """
 
 from __future__ import annotations

@@ -5,9 +5,10 @@ from __future__ import annotations
 from fractions import Fraction
 
 import pytest
-from gustform_hil.frame_time import FD_LENGTHS, BitRates, frame_bits
 from hypothesis import given
 from hypothesis import strategies as st
+
+from gustform_hil.frame_time import FD_LENGTHS, BitRates, frame_bits
 
 
 @pytest.mark.parametrize(
@@ -34,7 +35,7 @@ def test_bits_of_classic_frames() -> None:
 
 @pytest.mark.parametrize(("fd", "length"), [(False, 9), (False, -1), (True, 9), (True, 65)])
 def test_a_length_that_no_frame_has(fd: bool, length: int) -> None:
-    with pytest.raises(ValueError, match="no .* frame has"):
+    with pytest.raises(ValueError, match=r"no .* frame has"):
         frame_bits(length, fd=fd)
 
 

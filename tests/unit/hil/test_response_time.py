@@ -7,6 +7,7 @@ from dataclasses import replace
 from fractions import Fraction
 
 import pytest
+
 from gustform_hil.response_time import Bus, Traffic, load, response_times
 
 BIT = Fraction(1)  # everything below in bits
@@ -26,8 +27,8 @@ def times(messages: list[Traffic], bus: Bus = BUS) -> list[Fraction]:
 
 # ---- The published example ------------------------------------------------------------------------------------------
 
-# Davis et al. 2007: three messages of 7 bytes at 125 kbit/s, 125 bits or 1 ms each. The analysis of 1994 looks at the first
-# instance of C only, finds 3 ms and calls the set schedulable; the second instance of C takes 3.5 ms.
+# Davis et al. 2007: three messages of 7 bytes at 125 kbit/s, 125 bits or 1 ms each. The analysis of 1994 looks at the
+# first instance of C only, finds 3 ms and calls the set schedulable; the second instance of C takes 3.5 ms.
 EXAMPLE = [traffic("A", 125, 312.5), traffic("B", 125, 437.5, 406.25), traffic("C", 125, 437.5, 406.25)]
 
 
