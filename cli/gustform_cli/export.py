@@ -14,8 +14,10 @@ from gustform.turbines.pmsg_turbine import PmsgTurbine
 from gustform_codegen.emit.controller.block import Block, controller_block
 from gustform_codegen.emit.controller.discretise import Method, discretise
 from gustform_codegen.emit.controller.folder import default_prefix, write_folder
-from gustform_codegen.emit.controller.frequency import as_csv, as_text, frequency_response
-from gustform_codegen.emit.controller.program import program
+from gustform_codegen.emit.controller.footprint import as_json, as_text, footprint, targets
+from gustform_codegen.emit.controller.frequency import as_csv, frequency_response
+from gustform_codegen.emit.controller.frequency import as_text as differences
+from gustform_codegen.emit.controller.program import Program, program
 
 _LONGEST = 1.0  # s; a longer period is a slip of the unit
 
@@ -37,7 +39,7 @@ def export_controller(
     overrides: Sequence[str],
     report: bool,
 ) -> str:
-    """Write the folder; returns what to print: its path, or with `report` the table of differences before it."""
+    """Write the folder; returns what to print: with `report` the table of differences, the memory needed, the path."""
     h = _period(period)
     if scenario is None:
         if overrides:
@@ -46,12 +48,30 @@ def export_controller(
     else:
         block = block_of_scenario(name, scenario, overrides)
     made = program(discretise(block, h, Method(method)))
-    write_folder(made, default_prefix(block.name) if prefix is None else prefix, double, out)
+    known_as = default_prefix(block.name) if prefix is None else prefix
+    write_folder(made, known_as, double, out)
+    memory = _memory(made, known_as, double, out)
     if not report:
-        return str(out)
+        return f"{memory}{out}"
     pairs = frequency_response(made.step)
     (out / "frequency.csv").write_text(as_csv(pairs), encoding="utf-8", newline="\n")
-    return f"{as_text(made.step, pairs)}\n{out}"
+    return f"{differences(made.step, pairs)}\n{memory}{out}"
+
+
+def _memory(made: Program, prefix: str, double: bool, out: Path) -> str:
+    """What the compilers here make of it, as text. footprint.json has it too, the one file that depends on them."""
+    file = out / "footprint.json"
+    file.unlink(missing_ok=True)
+    found, failed = [], []
+    for target in targets():
+        try:
+            found.append(footprint(made, prefix, double, out, target))
+        except GustformError as error:
+            failed.append(f"{target.name}: not measured: {error.message}\n")
+    if not found:
+        return "".join(failed) or "no C compiler here: stack and sizes not measured\n"
+    file.write_text(as_json(found), encoding="utf-8", newline="\n")
+    return as_text(found) + "".join(failed)
 
 
 def _period(text: str) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -26,11 +27,41 @@ def test_a_control_by_its_name(tmp_path: Path) -> None:
     assert "v_q         omega_gsc" in done.stdout
     assert {file.name for file in (tmp_path / "rig").iterdir()} == {
         "gfl.c", "gfl.h", "gfl.json", "gfl.a2l", "test_gfl.c", "vectors.h",
-        "gust_controller.h", "gfl_interface.h", "gfl_interface.c", "CMakeLists.txt", "README.md", "frequency.csv",
+        "gust_controller.h", "gfl_interface.h", "gfl_interface.c", "CMakeLists.txt", "README.md",
+        "frequency.csv", "footprint.json",
     }  # fmt: skip
     found = json.loads((tmp_path / "rig" / "gfl.json").read_text())
     assert (found["period_s"], found["real"], found["name"]) == (5e-4, "double", "gfl")
     assert "#define GFL_DOUBLE 1" in (tmp_path / "rig" / "gfl.h").read_text()
+
+
+def test_memory_is_printed_and_kept(tmp_path: Path) -> None:
+    """The limits are those of a bench controller on a Cortex-M4F: frames of 256 bytes, 5 kB of text, no data."""
+    done = export("DualPort", "--out", "rig", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    found = {f["target"]: f for f in json.loads((tmp_path / "rig" / "footprint.json").read_text())}
+    assert set(found) == {"host", "Cortex-M4F"}  # both compilers are of the set-up
+    for one in found.values():
+        assert one["compiler"] in done.stdout
+        assert f"{one['chain_bytes']}  {' > '.join(one['chain'])}" in done.stdout
+        assert (one["data"], one["bss"], one["context"]) == (0, 0, 288)
+        assert set(one["chain"]) <= set(one["frames"])
+        assert max(one["frames"].values()) <= one["chain_bytes"] <= sum(one["frames"].values())
+    small = found["Cortex-M4F"]
+    assert small["text"] <= 5000
+    assert 0 < max(small["frames"].values()) <= 256
+    assert set(small["library"]) <= {"memcpy", "memset", "floorf"}
+
+
+def test_without_a_compiler_there_is_a_folder_all_the_same(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "gustform_cli", "export", "controller", "Matching", "--out", "rig"]
+    bare = {**os.environ, "PATH": str(tmp_path)}
+    bare.pop("CC", None)
+    done = subprocess.run(command, cwd=tmp_path, env=bare, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "not measured" in done.stdout
+    assert (tmp_path / "rig" / "matching.c").exists()
+    assert not (tmp_path / "rig" / "footprint.json").exists()
 
 
 def test_a_turbine_of_a_scenario_begins_in_its_steady_state(tmp_path: Path) -> None:

@@ -138,6 +138,8 @@ def _readme(program: Program, names: Names) -> str:
         "- C99 and C++. No heap, no static data, no recursion, bounded loops; of the C library `sqrt` and `floor`",
         "  alone.",
         "- Compile with `-ffp-contract=off`: results are then the same bits on all machines with IEEE 754 arithmetic.",
+        "- `footprint.json`, where the export found a compiler: frames on the stack, worst chain of calls, size of the",
+        "  object. It is the one file that depends on the machine of the export.",
         *warped,
         "",
         "```c",
