@@ -5,7 +5,7 @@ Knows numpy and ctypes only; what a model means is none of its business.
 
 from gustform_runtime.errors import RunError, Status
 from gustform_runtime.locate import gust_run_path, include_dir, library_path
-from gustform_runtime.simulation import Option, Simulation, solver_versions
+from gustform_runtime.simulation import Option, SampledBlock, SampledCount, Simulation, solver_versions
 from gustform_runtime.statistics import RAINFLOW, Cycles, Histogram, Keep, Moments, Spectrum, Statistics
 
 __all__ = [
@@ -16,6 +16,8 @@ __all__ = [
     "Moments",
     "Option",
     "RunError",
+    "SampledBlock",
+    "SampledCount",
     "Simulation",
     "Spectrum",
     "Statistics",

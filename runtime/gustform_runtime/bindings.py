@@ -8,6 +8,7 @@ from gustform_runtime.errors import Status
 from gustform_runtime.locate import library_path
 
 SERIES_READER = ctypes.CFUNCTYPE(c_int, c_void_p, c_int64, c_int64, POINTER(c_double), POINTER(c_double))
+SAMPLED_STEP = ctypes.CFUNCTYPE(c_int, c_void_p, c_double, POINTER(c_double), POINTER(c_double))
 ROW_SINK = ctypes.CFUNCTYPE(c_int, c_void_p, c_int64, POINTER(c_double), POINTER(c_float))
 
 
@@ -31,6 +32,38 @@ class Counters(ctypes.Structure):
         ("cut_steps", c_int64),
         ("last_step", c_double),
         ("last_order", c_int32),
+    )
+
+
+class SampledInfo(ctypes.Structure):
+    """gust_sampled_info of gust_model.h, field by field."""
+
+    _fields_ = (
+        ("name", c_char_p),
+        ("period", c_double),
+        ("delay", c_int32),
+        ("real_size", c_int32),
+        ("n_measurements", c_int32),
+        ("n_commands", c_int32),
+        ("measurement_name", POINTER(c_char_p)),
+        ("measurement_unit", POINTER(c_char_p)),
+        ("command_name", POINTER(c_char_p)),
+        ("command_unit", POINTER(c_char_p)),
+        ("command_start", POINTER(c_double)),
+    )
+
+
+SAMPLED_ERRORS = 8  # bits of an error signal that are counted
+
+
+class SampledCounters(ctypes.Structure):
+    """gust_sampled_statistics of gust_sim.h, field by field."""
+
+    _fields_ = (
+        ("samples", c_int64),
+        ("bad_samples", c_int64),
+        ("errors", c_int64 * SAMPLED_ERRORS),
+        ("first_error", c_double),
     )
 
 
@@ -106,11 +139,15 @@ _SIGNATURES: dict[str, tuple[type | None, tuple[type, ...]]] = {
     "gust_model_n_channels": (c_int32, (_HANDLE,)),
     "gust_model_channel_name": (c_char_p, (_HANDLE, c_int32)),
     "gust_model_channel_unit": (c_char_p, (_HANDLE, c_int32)),
+    "gust_model_n_sampled": (c_int32, (_HANDLE,)),
+    "gust_model_sampled_block": (POINTER(SampledInfo), (_HANDLE, c_int32)),
     "gust_sim_create": (c_int, (_HANDLE, POINTER(_HANDLE))),
     "gust_sim_destroy": (None, (POINTER(_HANDLE),)),
     "gust_sim_set_option": (c_int, (_HANDLE, c_char_p, c_double)),
     "gust_sim_set_series_reader": (c_int, (_HANDLE, c_int32, SERIES_READER, c_void_p)),
     "gust_sim_set_sink": (c_int, (_HANDLE, c_double, c_int32, ROW_SINK, c_void_p)),
+    "gust_sim_set_sampled": (c_int, (_HANDLE, c_int32, SAMPLED_STEP, c_void_p)),
+    "gust_sim_sampled_statistics": (c_int, (_HANDLE, c_int32, POINTER(SampledCounters))),
     "gust_sim_initialise": (c_int, (_HANDLE, c_double)),
     "gust_sim_advance": (c_int, (_HANDLE, c_double, POINTER(c_double))),
     "gust_sim_request_stop": (None, (_HANDLE,)),

@@ -10,6 +10,7 @@ class Status(IntEnum):
     STOP_REQUESTED = 1
     END_OF_DATA = 2
     SINK_STOPPED = 3
+    CONTROLLER_STOPPED = 4
     BAD_ARGUMENT = -1
     BAD_ORDER = -2
     UNKNOWN_OPTION = -3
@@ -18,6 +19,7 @@ class Status(IntEnum):
     BAD_CONTAINER = -102
     BAD_TABLE = -103
     BAD_KERNEL = -104
+    BAD_CONTROLLER = -105
     NOT_FINITE = -201
     SINGULAR = -202
     NOT_CONSISTENT = -203
@@ -30,6 +32,7 @@ class Status(IntEnum):
     CHATTERING = -402
     RESTART_FAILED = -403
     BAD_PERIOD = -404
+    CONTROLLER_FAILED = -405
     SERIES_UNREADABLE = -501
     BAD_SERIES = -502
     SERIES_NOT_COVERING = -503

@@ -10,17 +10,19 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from gustform_runtime.bindings import ROW_SINK, SERIES_READER, Counters, library
+from gustform_runtime.bindings import ROW_SINK, SAMPLED_STEP, SERIES_READER, Counters, SampledCounters, library
 from gustform_runtime.errors import RunError, Status
 from gustform_runtime.statistics import Statistics
 
 Doubles = NDArray[np.float64]
 Reader = Callable[[int, int], tuple[Doubles, Doubles]]
 Sink = Callable[[Doubles, NDArray[np.float32]], None]
+SampledStep = Callable[[float, Doubles], Doubles]
 
 _MESSAGE_SIZE = 4096
 _SINK_FAILED = -1
 _READER_FAILED = -1
+_STEP_FAILED = -1
 
 
 class Option(NamedTuple):
@@ -29,6 +31,32 @@ class Option(NamedTuple):
     name: str
     default: float
     description: str
+
+
+class SampledBlock(NamedTuple):
+    """A controller outside of the equations: what it measures and what it commands, in order, with units.
+
+    `period` in s, `delay` in samples; `real_size` is that of its numbers, 4 bytes or 8, which measurements and commands
+    are rounded to. `start` holds before the first sample.
+    """
+
+    name: str
+    period: float
+    delay: int
+    real_size: int
+    measurements: dict[str, str]
+    commands: dict[str, str]
+    start: Doubles
+
+
+class SampledCount(NamedTuple):
+    """How a sampled block has fared: `errors` are samples with that bit of the error signal, least first; `first_error`
+    the time of the first bad sample, s, nan if there was none."""
+
+    samples: int
+    bad_samples: int
+    errors: list[int]
+    first_error: float
 
 
 def _address(array: NDArray[Any]) -> ctypes.c_void_p:
@@ -72,6 +100,7 @@ class Simulation:
         self.n_unknowns: int = self._library.gust_model_n_unknowns(self._model)
         self.n_nonzeros: int = self._library.gust_model_n_nonzeros(self._model)
         self.n_channels: int = self._library.gust_model_n_channels(self._model)
+        self.n_sampled: int = self._library.gust_model_n_sampled(self._model)
 
     # -- life ---------------------------------------------------------------------------------------------------------
 
@@ -171,6 +200,32 @@ class Simulation:
         self._check(self._library.gust_sim_set_statistics(self._open(), statistics.handle, start))
         self._callbacks.append(statistics)  # alive as long as C may write to it
 
+    def set_sampled(self, block: int, step: SampledStep) -> None:
+        """At each sample of a sampled block call step(time (s), measurements) -> commands, in place of its own
+        controller. Names and order are those of sampled_blocks(); numbers are rounded to the block's type on either
+        side."""
+        blocks = self.sampled_blocks()
+        n_in, n_out = (
+            (len(blocks[block].measurements), len(blocks[block].commands)) if 0 <= block < len(blocks) else (0, 0)
+        )
+
+        def sample(_context: int, time: float, measurements: Any, commands: Any) -> int:
+            try:
+                given = np.asarray(
+                    step(time, np.ctypeslib.as_array(measurements, shape=(n_in,)).copy()), dtype=np.float64
+                )
+                if given.shape != (n_out,):
+                    raise ValueError(f"a sampled block with {n_out} commands got an array of shape {given.shape}")
+                np.ctypeslib.as_array(commands, shape=(n_out,))[:] = given
+                return 0
+            except BaseException as error:  # must not travel through C
+                self._raised = error
+                return _STEP_FAILED
+
+        callback = SAMPLED_STEP(sample)
+        self._check(self._library.gust_sim_set_sampled(self._open(), block, callback, None))
+        self._callbacks.append(callback)
+
     # -- run ----------------------------------------------------------------------------------------------------------
 
     def initialise(self, t0: float = 0.0) -> None:
@@ -234,6 +289,34 @@ class Simulation:
         """Units of the recorded channels, in the order of a row."""
         unit = self._library.gust_model_channel_unit
         return [unit(self._model, k).decode() for k in range(self.n_channels)]
+
+    def sampled_blocks(self) -> list[SampledBlock]:
+        """The sampled blocks of the table, in the order in which set_sampled() counts them."""
+        self._open()
+        found = []
+        for number in range(self.n_sampled):
+            info = self._library.gust_model_sampled_block(self._model, number).contents
+            n_in, n_out = info.n_measurements, info.n_commands
+            measured = zip(info.measurement_name[:n_in], info.measurement_unit[:n_in], strict=True)
+            commanded = zip(info.command_name[:n_out], info.command_unit[:n_out], strict=True)
+            found.append(
+                SampledBlock(
+                    info.name.decode(),
+                    info.period,
+                    info.delay,
+                    info.real_size,
+                    {name.decode(): unit.decode() for name, unit in measured},
+                    {name.decode(): unit.decode() for name, unit in commanded},
+                    np.array(info.command_start[:n_out]),
+                )
+            )
+        return found
+
+    def sampled_statistics(self, block: int) -> SampledCount:
+        """Samples and errors of a sampled block so far."""
+        counters = SampledCounters()
+        self._check(self._library.gust_sim_sampled_statistics(self._open(), block, ctypes.byref(counters)))
+        return SampledCount(counters.samples, counters.bad_samples, list(counters.errors), counters.first_error)
 
     def statistics(self) -> dict[str, int | float]:
         """Counters of the run, see gust_statistics in gust_sim.h."""

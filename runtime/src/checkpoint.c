@@ -38,6 +38,7 @@ static void archive_state(gust_sim *sim, gust_archive *archive)
     gust_assembly_archive(&sim->system.assembly, archive);
     gust_series_archive(&sim->system.series, archive);
     gust_sampler_archive(&sim->sampler, archive);
+    gust_controls_archive(&sim->controls, archive);
     gust_events_archive(&sim->events, archive);
     gust_solver_archive(&sim->solver, archive);
     gust_factors_archive(&sim->initial.factors, archive);

@@ -285,8 +285,9 @@ static bool chatters(gust_events *events, const gust_options *options, double t)
 }
 
 gust_status gust_events_handle(gust_events *events, gust_system *system, gust_sampler *sampler,
-                               gust_initial *initial, const gust_options *options, double t, bool found,
-                               double *y, double *yp, bool *changed, char *message, size_t size)
+                               gust_controls *controls, gust_initial *initial, const gust_options *options,
+                               double t, bool found, double *y, double *yp, bool *changed, char *message,
+                               size_t size)
 {
     ++events->n_events;
     if (found && chatters(events, options, t)) {
@@ -294,6 +295,7 @@ gust_status gust_events_handle(gust_events *events, gust_system *system, gust_sa
     }
     bool conditions = false;
     bool samples = false;
+    bool stepped = false;
     /* A zero crossing is worth a restart even if no value changes: right of a limiter's the equations are
      * smooth again, and the integrator does not like to go on from a function that stays at 0. */
     *changed = found;
@@ -308,8 +310,15 @@ gust_status gust_events_handle(gust_events *events, gust_system *system, gust_sa
     if (!gust_series_update(&system->series, t, system->assembly.inputs, changed)) {
         return series_failure(system, message, size);
     }
+    const gust_status controlled = gust_controls_step(controls, system, t, y, yp, &stepped, message, size);
+    if (controlled != GUST_OK) {
+        return controlled;
+    }
     if (conditions || samples) {
         fire(events, system, sampler, samples, t, y, yp, changed);
+    }
+    if (stepped) {
+        gust_controls_hold(controls, system, changed);
     }
     int rounds = 0;
     while (*changed) {

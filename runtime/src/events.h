@@ -10,6 +10,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "controls.h"
 #include "initial.h"
 #include "options.h"
 #include "sampler.h"
@@ -69,8 +70,9 @@ bool gust_events_missed(gust_events *events, gust_system *system, double t, cons
 /* Everything that happens at t. `found`: the integrator stopped at roots, marked in events->found.
  * y, yp are the values before on entry and consistent values after on return, if *changed. */
 gust_status gust_events_handle(gust_events *events, gust_system *system, gust_sampler *sampler,
-                               gust_initial *initial, const gust_options *options, double t, bool found,
-                               double *y, double *yp, bool *changed, char *message, size_t size);
+                               gust_controls *controls, gust_initial *initial, const gust_options *options,
+                               double t, bool found, double *y, double *yp, bool *changed, char *message,
+                               size_t size);
 
 /* For checkpoints; the conditions themselves are settled again after loading. */
 void gust_events_archive(gust_events *events, gust_archive *archive);

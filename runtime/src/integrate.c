@@ -34,7 +34,8 @@ static gust_status write_rows(gust_sim *sim, gust_sink *sink, double t)
 
 double gust_next_event(const gust_sim *sim)
 {
-    return fmin(gust_sampler_next(&sim->sampler), gust_series_next(&sim->system.series));
+    const double sample = fmin(gust_sampler_next(&sim->sampler), gust_controls_next(&sim->controls));
+    return fmin(sample, gust_series_next(&sim->system.series));
 }
 
 /* What the first step after an event is at most, s; the integrator doubles it as long as the error allows. */
@@ -82,9 +83,10 @@ static gust_status handle_event(gust_sim *sim)
 {
     gust_solver *solver = &sim->solver;
     bool changed = false;
-    const gust_status status = gust_events_handle(
-        &sim->events, &sim->system, &sim->sampler, &sim->initial, &sim->options, solver->t, sim->root_found,
-        gust_vector_data(solver->y), gust_vector_data(solver->yp), &changed, sim->message, sizeof sim->message);
+    const gust_status status =
+        gust_events_handle(&sim->events, &sim->system, &sim->sampler, &sim->controls, &sim->initial,
+                           &sim->options, solver->t, sim->root_found, gust_vector_data(solver->y),
+                           gust_vector_data(solver->yp), &changed, sim->message, sizeof sim->message);
     sim->pending = false;
     sim->root_found = false;
     sim->next_event = gust_next_event(sim);

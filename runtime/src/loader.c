@@ -4,7 +4,6 @@
 
 #include <errno.h>
 #include <math.h>
-#include <stdarg.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -15,224 +14,28 @@
 #include "container.h"
 #include "gustform/gust_model.h"
 #include "kernel_library.h"
+#include "loader_sampled.h"
 #include "memory.h"
 #include "model.h"
+#include "reader.h"
 #include "text.h"
 
 enum { N_COUNTS = 8, N_TEXT_TABLES_OF_TYPE = 8, N_TEXT_TABLES_OF_MODEL = 2, MAX_GRID_LINES = 1000000 };
 
-typedef struct loader {
-    gust_model *model;
-    gust_container container;
-    const char *folder; /* where relative paths start; NULL for the working folder */
-    char *message;
-    size_t message_size;
-    gust_status status;
-    char prefix[32]; /* "type.3." while that type is read */
-} loader;
-
-__attribute__((format(printf, 3, 4))) static void note_refusal(loader *load, gust_status status,
-                                                               const char *format, ...)
-{
-    if (load->message != NULL && load->message_size > 0) {
-        va_list arguments;
-        va_start(arguments, format);
-        vsnprintf(load->message, load->message_size, format, arguments);
-        va_end(arguments);
-    }
-    load->status = status;
-}
-
-/* Keeps status and message; false, so that a function can return it. */
-#define refuse(...) (note_refusal(__VA_ARGS__), false)
-
-static bool no_memory(loader *load)
-{
-    return refuse(load, GUST_OUT_OF_MEMORY, "out of memory while reading the model");
-}
-
-/* -- sections ------------------------------------------------------------------------------------------- */
-
-/* Section prefix + name; NULL if there is none, which is right only where nothing is expected in it. */
-static const gust_section *section(const loader *load, const char *name)
-{
-    char full[GUST_SECTION_NAME];
-    const int length = snprintf(full, sizeof full, "%s%s", load->prefix, name);
-    return length > 0 && length < (int)sizeof full ? gust_container_find(&load->container, full) : NULL;
-}
-
-static const char *dtype_name(gust_dtype dtype)
-{
-    switch (dtype) {
-    case GUST_F64:
-        return "f64";
-    case GUST_I32:
-        return "i32";
-    case GUST_U8:
-        return "u8";
-    case GUST_I64:
-        return "i64";
-    }
-    return "?";
-}
-
-/* Array `name` of exactly `count` elements into *data. */
-static bool array(loader *load, const char *name, gust_dtype dtype, int64_t count, const void **data)
-{
-    static const double nothing[1];
-    const gust_section *found = section(load, name);
-    if (found == NULL && count == 0) {
-        *data = nothing;
-        return true;
-    }
-    if (found == NULL) {
-        return refuse(load, GUST_BAD_TABLE, "section \"%s%s\" is missing: build the model again", load->prefix,
-                      name);
-    }
-    if (found->dtype != dtype) {
-        return refuse(load, GUST_BAD_TABLE, "section \"%s\" holds %s, not %s: build the model again",
-                      found->name, dtype_name(found->dtype), dtype_name(dtype));
-    }
-    if (count < 0 || found->count != (uint64_t)count) {
-        return refuse(load, GUST_BAD_TABLE, "section \"%s\" has %llu elements, not %lld: build the model again",
-                      found->name, (unsigned long long)found->count, (long long)count);
-    }
-    *data = found->data;
-    return true;
-}
-
-static bool doubles(loader *load, const char *name, int64_t count, const double **data)
-{
-    const void *found = NULL;
-    const bool good = array(load, name, GUST_F64, count, &found);
-    *data = found;
-    return good;
-}
-
-static bool integers(loader *load, const char *name, int64_t count, const int32_t **data)
-{
-    const void *found = NULL;
-    const bool good = array(load, name, GUST_I32, count, &found);
-    *data = found;
-    return good;
-}
-
-static bool bytes(loader *load, const char *name, int64_t count, const uint8_t **data)
-{
-    const void *found = NULL;
-    const bool good = array(load, name, GUST_U8, count, &found);
-    *data = found;
-    return good;
-}
-
-/* An array of whatever length it has. */
-static bool sized(loader *load, const char *name, gust_dtype dtype, const void **data, int64_t *count)
-{
-    const gust_section *found = section(load, name);
-    *count = 0;
-    if (found != NULL) {
-        if (found->count > INT64_MAX / 16) {
-            return refuse(load, GUST_BAD_TABLE, "section \"%s\" is too long", found->name);
-        }
-        *count = (int64_t)found->count;
-    }
-    return array(load, name, dtype, *count, data);
-}
-
-/* Array of integers, all in low .. high - 1. */
-static bool indices(loader *load, const char *name, int64_t count, int32_t low, int32_t high,
-                    const int32_t **data)
-{
-    if (!integers(load, name, count, data)) {
-        return false;
-    }
-    for (int64_t i = 0; i < count; ++i) {
-        if ((*data)[i] < low || (*data)[i] >= high) {
-            return refuse(load, GUST_BAD_TABLE,
-                          "\"%s%s\"[%lld] is %d, outside %d ... %d: build the model again", load->prefix, name,
-                          (long long)i, (*data)[i], low, high - 1);
-        }
-    }
-    return true;
-}
-
-static bool finite_doubles(loader *load, const char *name, int64_t count, const double **data)
-{
-    if (!doubles(load, name, count, data)) {
-        return false;
-    }
-    for (int64_t i = 0; i < count; ++i) {
-        if (!isfinite((*data)[i])) {
-            return refuse(load, GUST_BAD_TABLE, "\"%s%s\"[%lld] is %g: it must be a number", load->prefix, name,
-                          (long long)i, (*data)[i]);
-        }
-    }
-    return true;
-}
-
-/* `count` strings, each closed by a zero byte, as an array of pointers that the model owns. */
-static bool texts(loader *load, const char *name, int64_t count, const char ***table)
-{
-    const uint8_t *data = NULL;
-    int64_t size = 0;
-    const void *found = NULL;
-    if (!sized(load, name, GUST_U8, &found, &size)) {
-        return false;
-    }
-    data = found;
-    int64_t closed = 0;
-    for (int64_t i = 0; i < size; ++i) {
-        closed += data[i] == 0 ? 1 : 0;
-    }
-    if (closed != count || (size > 0 && data[size - 1] != 0)) {
-        return refuse(load, GUST_BAD_TABLE,
-                      "section \"%s%s\" holds %lld texts, not %lld: build the model again", load->prefix, name,
-                      (long long)closed, (long long)count);
-    }
-    char **made = gust_allocate((size_t)count, sizeof *made);
-    if (made == NULL) {
-        return no_memory(load);
-    }
-    load->model->text_tables[load->model->n_text_tables++] = (char *)made;
-    const char *next = (const char *)data;
-    for (int64_t i = 0; i < count; ++i) {
-        memcpy(&made[i], &next, sizeof next);
-        next += strlen(next) + 1;
-    }
-    *table = (const char **)made;
-    return true;
-}
-
-/* One string, "" if the section is absent. */
-static bool text(loader *load, const char *name, const char **result)
-{
-    const void *found = NULL;
-    int64_t size = 0;
-    if (!sized(load, name, GUST_U8, &found, &size)) {
-        return false;
-    }
-    *result = size > 0 ? found : "";
-    if (size > 0 && (*result)[size - 1] != '\0') {
-        return refuse(load, GUST_BAD_TABLE, "section \"%s%s\" is not closed by a zero byte", load->prefix,
-                      name);
-    }
-    return true;
-}
-
 /* -- the parts of a model ------------------------------------------------------------------------------- */
 
-static bool read_counts(loader *load)
+static bool read_counts(gust_reader *load)
 {
     gust_model *model = load->model;
     const int32_t *counts = NULL;
-    if (!integers(load, "counts", N_COUNTS, &counts)) {
+    if (!gust_read_integers(load, "counts", N_COUNTS, &counts)) {
         return false;
     }
     /* Every counted thing takes at least one byte of the file, which bounds what is allocated for it. */
     for (int i = 0; i < N_COUNTS; ++i) {
         if (counts[i] < 0) {
-            return refuse(load, GUST_BAD_TABLE, "\"counts\"[%d] is negative (%d): build the model again", i,
-                          counts[i]);
+            return gust_refuse(load, GUST_BAD_TABLE, "\"counts\"[%d] is negative (%d): build the model again",
+                               i, counts[i]);
         }
     }
     model->n_unknowns = counts[0];
@@ -245,19 +48,21 @@ static bool read_counts(loader *load)
     model->n_channels = counts[7];
     const int64_t directory = load->container.n_sections;
     if (model->n_types > directory || model->n_series > directory || model->n_tables > directory) {
-        return refuse(load, GUST_BAD_TABLE,
-                      "more types, series or tables than sections: build the model again");
+        return gust_refuse(load, GUST_BAD_TABLE,
+                           "more types, series or tables than sections: build the model again");
     }
     if (model->n_unknowns == 0) {
-        return refuse(load, GUST_BAD_TABLE, "the model has no unknowns: there is nothing to simulate");
+        return gust_refuse(load, GUST_BAD_TABLE, "the model has no unknowns: there is nothing to simulate");
     }
     return true;
 }
 
-static bool allocate_parts(loader *load)
+static bool allocate_parts(gust_reader *load)
 {
     gust_model *model = load->model;
-    const size_t n_text_tables = (size_t)model->n_types * N_TEXT_TABLES_OF_TYPE + N_TEXT_TABLES_OF_MODEL;
+    const size_t n_text_tables = (size_t)model->n_types * N_TEXT_TABLES_OF_TYPE +
+                                 (size_t)model->n_sampled * GUST_TEXT_TABLES_OF_SAMPLED +
+                                 N_TEXT_TABLES_OF_MODEL;
     model->types = gust_allocate((size_t)model->n_types, sizeof *model->types);
     model->series = gust_allocate((size_t)model->n_series, sizeof *model->series);
     model->tables = gust_allocate((size_t)model->n_tables, sizeof *model->tables);
@@ -265,75 +70,78 @@ static bool allocate_parts(loader *load)
     model->text_tables = gust_allocate(n_text_tables, sizeof *model->text_tables);
     return (model->types != NULL && model->series != NULL && model->tables != NULL && model->paths != NULL &&
             model->text_tables != NULL) ||
-           no_memory(load);
+           gust_read_no_memory(load);
 }
 
-static bool read_pattern(loader *load)
+static bool read_pattern(gust_reader *load)
 {
     gust_model *model = load->model;
     const int32_t n = model->n_unknowns;
-    if (!indices(load, "column_start", (int64_t)n + 1, 0,
-                 model->n_nonzeros < INT32_MAX ? model->n_nonzeros + 1 : INT32_MAX, &model->column_start) ||
-        !indices(load, "row_index", model->n_nonzeros, 0, n, &model->row_index)) {
+    if (!gust_read_indices(load, "column_start", (int64_t)n + 1, 0,
+                           model->n_nonzeros < INT32_MAX ? model->n_nonzeros + 1 : INT32_MAX,
+                           &model->column_start) ||
+        !gust_read_indices(load, "row_index", model->n_nonzeros, 0, n, &model->row_index)) {
         return false;
     }
     if (model->column_start[0] != 0 || model->column_start[n] != model->n_nonzeros) {
-        return refuse(load, GUST_BAD_TABLE, "\"column_start\" does not run from 0 to the number of nonzeros");
+        return gust_refuse(load, GUST_BAD_TABLE,
+                           "\"column_start\" does not run from 0 to the number of nonzeros");
     }
     for (int32_t column = 0; column < n; ++column) {
         if (model->column_start[column + 1] < model->column_start[column]) {
-            return refuse(load, GUST_BAD_TABLE, "\"column_start\" decreases at column %d", column);
+            return gust_refuse(load, GUST_BAD_TABLE, "\"column_start\" decreases at column %d", column);
         }
         for (int32_t k = model->column_start[column] + 1; k < model->column_start[column + 1]; ++k) {
             if (model->row_index[k] <= model->row_index[k - 1]) {
-                return refuse(load, GUST_BAD_TABLE, "the rows of column %d are not sorted", column);
+                return gust_refuse(load, GUST_BAD_TABLE, "the rows of column %d are not sorted", column);
             }
         }
     }
     return true;
 }
 
-static bool read_unknowns(loader *load)
+static bool read_unknowns(gust_reader *load)
 {
     gust_model *model = load->model;
     const int64_t n = model->n_unknowns;
-    if (!finite_doubles(load, "start", n, &model->start) ||
-        !finite_doubles(load, "start_derivative", n, &model->start_derivative) ||
-        !finite_doubles(load, "nominal", n, &model->nominal) ||
-        !bytes(load, "differential", n, &model->differential) ||
-        !finite_doubles(load, "input_value", model->n_inputs, &model->input_value)) {
+    if (!gust_read_finite(load, "start", n, &model->start) ||
+        !gust_read_finite(load, "start_derivative", n, &model->start_derivative) ||
+        !gust_read_finite(load, "nominal", n, &model->nominal) ||
+        !gust_read_bytes(load, "differential", n, &model->differential) ||
+        !gust_read_finite(load, "input_value", model->n_inputs, &model->input_value)) {
         return false;
     }
     for (int64_t i = 0; i < n; ++i) {
         if (!(model->nominal[i] > 0.0)) {
-            return refuse(load, GUST_BAD_TABLE,
-                          "the nominal value of unknown %lld is %g: it must be greater than 0", (long long)i,
-                          model->nominal[i]);
+            return gust_refuse(load, GUST_BAD_TABLE,
+                               "the nominal value of unknown %lld is %g: it must be greater than 0",
+                               (long long)i, model->nominal[i]);
         }
         if (model->differential[i] > 1) {
-            return refuse(load, GUST_BAD_TABLE, "\"differential\"[%lld] is %d, not 0 or 1", (long long)i,
-                          model->differential[i]);
+            return gust_refuse(load, GUST_BAD_TABLE, "\"differential\"[%lld] is %d, not 0 or 1", (long long)i,
+                               model->differential[i]);
         }
     }
     return true;
 }
 
-static bool read_table(loader *load, int32_t number)
+static bool read_table(gust_reader *load, int32_t number)
 {
     gust_table *table = &load->model->tables[number];
     snprintf(load->prefix, sizeof load->prefix, "table.%d.", number);
     const double *grid = NULL;
     const int32_t *size = NULL;
-    if (!finite_doubles(load, "grid", 4, &grid) || !indices(load, "size", 2, 2, MAX_GRID_LINES, &size)) {
+    if (!gust_read_finite(load, "grid", 4, &grid) ||
+        !gust_read_indices(load, "size", 2, 2, MAX_GRID_LINES, &size)) {
         return false;
     }
     if (!(grid[1] > 0.0) || !(grid[3] > 0.0)) {
-        return refuse(load, GUST_BAD_TABLE,
-                      "the grid of table %d has steps %g and %g: both must be greater than 0", number, grid[1],
-                      grid[3]);
+        return gust_refuse(load, GUST_BAD_TABLE,
+                           "the grid of table %d has steps %g and %g: both must be greater than 0", number,
+                           grid[1], grid[3]);
     }
     const double *coefficient = NULL;
-    if (!finite_doubles(load, "coefficient", ((int64_t)size[0] + 2) * ((int64_t)size[1] + 2), &coefficient)) {
+    if (!gust_read_finite(load, "coefficient", ((int64_t)size[0] + 2) * ((int64_t)size[1] + 2), &coefficient)) {
         return false;
     }
     *table = (gust_table){.x_start = grid[0],
@@ -346,32 +154,19 @@ static bool read_table(loader *load, int32_t number)
     return true;
 }
 
-static const char *complete_path(const char *folder, const char *path)
-{
-    if (path[0] == '/' || folder == NULL) {
-        return NULL;
-    }
-    const size_t size = strlen(folder) + strlen(path) + 2;
-    char *made = gust_allocate(size, 1);
-    if (made != NULL) {
-        snprintf(made, size, "%s/%s", folder, path);
-    }
-    return made;
-}
-
-static bool check_samples(loader *load, const gust_model_series *series)
+static bool check_samples(gust_reader *load, const gust_model_series *series)
 {
     for (int64_t i = 0; i < series->n_samples; ++i) {
         if (!isfinite(series->value[i])) {
-            return refuse(load, GUST_BAD_SERIES, "series \"%s\": sample %lld is %g: it must be a number",
-                          series->name, (long long)i, series->value[i]);
+            return gust_refuse(load, GUST_BAD_SERIES, "series \"%s\": sample %lld is %g: it must be a number",
+                               series->name, (long long)i, series->value[i]);
         }
         if (!series->uniform && !isfinite(series->time[i])) {
-            return refuse(load, GUST_BAD_SERIES, "series \"%s\": the time of sample %lld is %g", series->name,
-                          (long long)i, series->time[i]);
+            return gust_refuse(load, GUST_BAD_SERIES, "series \"%s\": the time of sample %lld is %g",
+                               series->name, (long long)i, series->time[i]);
         }
         if (!series->uniform && i > 0 && !(series->time[i] > series->time[i - 1])) {
-            return refuse(
+            return gust_refuse(
                 load, GUST_BAD_SERIES,
                 "series \"%s\": the time of sample %lld (%g s) is not after that of the one before (%g s)",
                 series->name, (long long)i, series->time[i], series->time[i - 1]);
@@ -381,21 +176,21 @@ static bool check_samples(loader *load, const gust_model_series *series)
 }
 
 /* The samples of a series that is held in the model. */
-static bool read_samples(loader *load, gust_model_series *series)
+static bool read_samples(gust_reader *load, gust_model_series *series)
 {
     const void *value = NULL;
-    if (!sized(load, "value", GUST_F64, &value, &series->n_samples)) {
+    if (!gust_read_sized(load, "value", GUST_F64, &value, &series->n_samples)) {
         return false;
     }
     series->value = value;
     if (series->n_samples < 1) {
-        return refuse(load, GUST_BAD_SERIES, "series \"%s\" is empty", series->name);
+        return gust_refuse(load, GUST_BAD_SERIES, "series \"%s\" is empty", series->name);
     }
-    return (series->uniform || doubles(load, "time", series->n_samples, &series->time)) &&
+    return (series->uniform || gust_read_doubles(load, "time", series->n_samples, &series->time)) &&
            check_samples(load, series);
 }
 
-static bool read_series(loader *load, int32_t number)
+static bool read_series(gust_reader *load, int32_t number)
 {
     gust_model *model = load->model;
     gust_model_series *series = &model->series[number];
@@ -403,15 +198,15 @@ static bool read_series(loader *load, int32_t number)
     const int32_t *kind = NULL;
     const double *timing = NULL;
     const void *slots = NULL;
-    if (!text(load, "name", &series->name) || !text(load, "unit", &series->unit) ||
-        !indices(load, "kind", 4, 0, 3, &kind) || !doubles(load, "timing", 3, &timing) ||
-        !sized(load, "slots", GUST_I32, &slots, &series->n_slots) ||
-        !indices(load, "slots", series->n_slots, 0, model->n_inputs, &series->slots)) {
+    if (!gust_read_text(load, "name", &series->name) || !gust_read_text(load, "unit", &series->unit) ||
+        !gust_read_indices(load, "kind", 4, 0, 3, &kind) || !gust_read_doubles(load, "timing", 3, &timing) ||
+        !gust_read_sized(load, "slots", GUST_I32, &slots, &series->n_slots) ||
+        !gust_read_indices(load, "slots", series->n_slots, 0, model->n_inputs, &series->slots)) {
         return false;
     }
     if (kind[0] > GUST_SERIES_PCHIP || kind[3] > 1) {
-        return refuse(load, GUST_BAD_TABLE, "series \"%s\" is of an unknown kind (%d, %d, %d, %d)",
-                      series->name, kind[0], kind[1], kind[2], kind[3]);
+        return gust_refuse(load, GUST_BAD_TABLE, "series \"%s\" is of an unknown kind (%d, %d, %d, %d)",
+                           series->name, kind[0], kind[1], kind[2], kind[3]);
     }
     series->interpolation = kind[0];
     series->source = kind[1];
@@ -421,14 +216,14 @@ static bool read_series(loader *load, int32_t number)
     series->dt = timing[1];
     series->t_end = timing[2];
     if (!isfinite(series->t0) || isnan(series->t_end) || !(series->t_end >= series->t0)) {
-        return refuse(load, GUST_BAD_SERIES,
-                      "series \"%s\" runs from %g s to %g s: it must end after it begins", series->name,
-                      series->t0, series->t_end);
+        return gust_refuse(load, GUST_BAD_SERIES,
+                           "series \"%s\" runs from %g s to %g s: it must end after it begins", series->name,
+                           series->t0, series->t_end);
     }
     if (series->uniform && !(series->dt > 0.0 && isfinite(series->dt))) {
-        return refuse(load, GUST_BAD_SERIES,
-                      "series \"%s\" has a sample step of %g s: it must be greater than 0", series->name,
-                      series->dt);
+        return gust_refuse(load, GUST_BAD_SERIES,
+                           "series \"%s\" has a sample step of %g s: it must be greater than 0", series->name,
+                           series->dt);
     }
     if (series->source == GUST_SERIES_INLINE && !read_samples(load, series)) {
         return false;
@@ -438,19 +233,20 @@ static bool read_series(loader *load, int32_t number)
                                         : series->time[series->n_samples - 1];
     }
     if (series->on_end == GUST_SERIES_END_REPEAT && !(isfinite(series->t_end) && series->t_end > series->t0)) {
-        return refuse(load, GUST_BAD_SERIES, "series \"%s\" is to be repeated but has no length (%g s to %g s)",
-                      series->name, series->t0, series->t_end);
+        return gust_refuse(load, GUST_BAD_SERIES,
+                           "series \"%s\" is to be repeated but has no length (%g s to %g s)", series->name,
+                           series->t0, series->t_end);
     }
     if (series->source == GUST_SERIES_FILE) {
         const char *path = NULL;
-        if (!text(load, "path", &path)) {
+        if (!gust_read_text(load, "path", &path)) {
             return false;
         }
         if (path[0] == '\0') {
-            return refuse(load, GUST_BAD_TABLE, "series \"%s\" has no path", series->name);
+            return gust_refuse(load, GUST_BAD_TABLE, "series \"%s\" has no path", series->name);
         }
         series->path = path;
-        const char *completed = complete_path(load->folder, path);
+        const char *completed = gust_read_path(load->folder, path);
         if (completed != NULL) {
             memcpy(&model->paths[number], &completed, sizeof completed);
             series->path = completed;
@@ -460,7 +256,7 @@ static bool read_series(loader *load, int32_t number)
 }
 
 /* The local Jacobian of each instance must land where its rows and columns say. */
-static bool check_positions(loader *load, const gust_model_type *type)
+static bool check_positions(gust_reader *load, const gust_model_type *type)
 {
     const gust_model *model = load->model;
     const gust_kernel *kernel = type->kernel;
@@ -468,8 +264,8 @@ static bool check_positions(loader *load, const gust_model_type *type)
         if (kernel->jacobian_row[k] < 0 || kernel->jacobian_row[k] >= kernel->n_unknowns + kernel->n_flows ||
             kernel->jacobian_column[k] < 0 ||
             kernel->jacobian_column[k] >= kernel->n_unknowns + kernel->n_external) {
-            return refuse(load, GUST_BAD_KERNEL, "type \"%s\": entry %d of the kernel's Jacobian is outside it",
-                          type->name, k);
+            return gust_refuse(load, GUST_BAD_KERNEL,
+                               "type \"%s\": entry %d of the kernel's Jacobian is outside it", type->name, k);
         }
     }
     for (int32_t i = 0; i < type->n_instances; ++i) {
@@ -486,68 +282,69 @@ static bool check_positions(loader *load, const gust_model_type *type)
                                        : external[local_column - kernel->n_unknowns];
             if (position[k] < model->column_start[column] || position[k] >= model->column_start[column + 1] ||
                 model->row_index[position[k]] != row) {
-                return refuse(load, GUST_BAD_TABLE,
-                              "instance \"%s\": entry %d of its Jacobian belongs in row %d, column %d, but "
-                              "\"jacobian_position\" says %d: build the model again",
-                              type->instance_name[i], k, row, column, position[k]);
+                return gust_refuse(
+                    load, GUST_BAD_TABLE,
+                    "instance \"%s\": entry %d of its Jacobian belongs in row %d, column %d, but "
+                    "\"jacobian_position\" says %d: build the model again",
+                    type->instance_name[i], k, row, column, position[k]);
             }
         }
     }
     return true;
 }
 
-static bool check_parameters(loader *load, const gust_model_type *type)
+static bool check_parameters(gust_reader *load, const gust_model_type *type)
 {
     for (int32_t i = 0; i < type->n_instances; ++i) {
         for (int32_t k = 0; k < type->kernel->n_parameters; ++k) {
             const double value = type->parameters[(int64_t)i * type->kernel->n_parameters + k];
             if (isnan(value)) {
-                return refuse(load, GUST_BAD_TABLE, "parameter %s.%s is not a number: give it a value",
-                              type->instance_name[i], type->parameter_name[k]);
+                return gust_refuse(load, GUST_BAD_TABLE, "parameter %s.%s is not a number: give it a value",
+                                   type->instance_name[i], type->parameter_name[k]);
             }
         }
     }
     return true;
 }
 
-static bool check_whens(loader *load, const gust_model_type *type)
+static bool check_whens(gust_reader *load, const gust_model_type *type)
 {
     for (int32_t k = 0; k < type->kernel->n_roots; ++k) {
         if (type->root_kind[k] > GUST_ROOT_WHEN) {
-            return refuse(load, GUST_BAD_TABLE, "type \"%s\": root %d is of unknown kind %d", type->name, k,
-                          type->root_kind[k]);
+            return gust_refuse(load, GUST_BAD_TABLE, "type \"%s\": root %d is of unknown kind %d", type->name,
+                               k, type->root_kind[k]);
         }
     }
     for (int32_t k = 0; k < type->kernel->n_whens; ++k) {
         if ((type->when_root[k] < 0) == (type->when_period[k] < 0)) {
-            return refuse(
+            return gust_refuse(
                 load, GUST_BAD_TABLE,
                 "type \"%s\": when-clause %d must have either a condition or a period (has root %d, parameter "
                 "%d)",
                 type->name, k, type->when_root[k], type->when_period[k]);
         }
         if (type->when_root[k] >= 0 && type->root_kind[type->when_root[k]] != GUST_ROOT_WHEN) {
-            return refuse(load, GUST_BAD_TABLE,
-                          "type \"%s\": when-clause %d waits for root %d, which is a kink", type->name, k,
-                          type->when_root[k]);
+            return gust_refuse(load, GUST_BAD_TABLE,
+                               "type \"%s\": when-clause %d waits for root %d, which is a kink", type->name, k,
+                               type->when_root[k]);
         }
     }
     return true;
 }
 
-static bool read_kernel(loader *load, gust_model_type *type)
+static bool read_kernel(gust_reader *load, gust_model_type *type)
 {
-    if (!text(load, "kernel", &type->kernel_path)) {
+    if (!gust_read_text(load, "kernel", &type->kernel_path)) {
         return false;
     }
     if (type->kernel_path[0] == '\0') {
-        return refuse(load, GUST_BAD_TABLE, "type \"%s\" names no kernel library", type->name);
+        return gust_refuse(load, GUST_BAD_TABLE, "type \"%s\" names no kernel library", type->name);
     }
     /* Without a slash dlopen would search the system folders. */
     const char *folder = load->folder != NULL ? load->folder : ".";
-    const char *completed = complete_path(folder, type->kernel_path);
+    const char *completed = gust_read_path(folder, type->kernel_path);
     if (completed == NULL && type->kernel_path[0] != '/') {
-        return no_memory(load);
+        return gust_read_no_memory(load);
     }
     type->kernel = gust_kernel_open(completed != NULL ? completed : type->kernel_path, &type->library,
                                     load->message, load->message_size);
@@ -563,17 +360,17 @@ static bool read_kernel(loader *load, gust_model_type *type)
     return true;
 }
 
-static bool read_type(loader *load, int32_t number)
+static bool read_type(gust_reader *load, int32_t number)
 {
     gust_model *model = load->model;
     gust_model_type *type = &model->types[number];
     snprintf(load->prefix, sizeof load->prefix, "type.%d.", number);
     const int32_t *counts = NULL;
-    if (!text(load, "name", &type->name) || !integers(load, "counts", 2, &counts)) {
+    if (!gust_read_text(load, "name", &type->name) || !gust_read_integers(load, "counts", 2, &counts)) {
         return false;
     }
     if (counts[0] < 0 || counts[0] > INT32_MAX - model->n_instances) {
-        return refuse(load, GUST_BAD_TABLE, "type \"%s\" has %d instances", type->name, counts[0]);
+        return gust_refuse(load, GUST_BAD_TABLE, "type \"%s\" has %d instances", type->name, counts[0]);
     }
     if (!read_kernel(load, type)) {
         return false;
@@ -584,36 +381,39 @@ static bool read_type(loader *load, int32_t number)
     type->n_instances = counts[0];
     model->n_instances += counts[0];
     if (kernel->n_unknowns > n || kernel->n_inputs > model->n_inputs) {
-        return refuse(load, GUST_BAD_TABLE,
-                      "the kernel of type \"%s\" has %d unknowns and %d inputs, more than the whole model: "
-                      "build it again",
-                      type->name, kernel->n_unknowns, kernel->n_inputs);
+        return gust_refuse(
+            load, GUST_BAD_TABLE,
+            "the kernel of type \"%s\" has %d unknowns and %d inputs, more than the whole model: "
+            "build it again",
+            type->name, kernel->n_unknowns, kernel->n_inputs);
     }
-    return texts(load, "instance_names", ni, &type->instance_name) &&
-           texts(load, "unknown_names", kernel->n_unknowns, &type->unknown_name) &&
-           texts(load, "equation_names", kernel->n_unknowns, &type->equation_name) &&
-           texts(load, "external_names", kernel->n_external, &type->external_name) &&
-           texts(load, "flow_names", kernel->n_flows, &type->flow_name) &&
-           texts(load, "root_names", kernel->n_roots, &type->root_name) &&
-           texts(load, "when_names", kernel->n_whens, &type->when_name) &&
-           texts(load, "parameter_names", kernel->n_parameters, &type->parameter_name) &&
-           indices(load, "first_unknown", ni, 0, n - kernel->n_unknowns + 1, &type->first_unknown) &&
-           indices(load, "external", ni * kernel->n_external, 0, n, &type->external) &&
-           indices(load, "flow_row", ni * kernel->n_flows, 0, n, &type->flow_row) &&
-           indices(load, "jacobian_position", ni * kernel->n_nonzeros, 0, model->n_nonzeros,
-                   &type->jacobian_position) &&
-           indices(load, "first_input", ni, 0, model->n_inputs - kernel->n_inputs + 1, &type->first_input) &&
-           indices(load, "table", ni * kernel->n_tables, 0, model->n_tables, &type->table) &&
-           doubles(load, "parameters", ni * kernel->n_parameters, &type->parameters) &&
-           finite_doubles(load, "discrete", ni * kernel->n_discrete, &type->discrete) &&
-           bytes(load, "root_kind", kernel->n_roots, &type->root_kind) &&
-           indices(load, "when_root", kernel->n_whens, -1, kernel->n_roots, &type->when_root) &&
-           indices(load, "when_period", kernel->n_whens, -1, kernel->n_parameters, &type->when_period) &&
+    return gust_read_texts(load, "instance_names", ni, &type->instance_name) &&
+           gust_read_texts(load, "unknown_names", kernel->n_unknowns, &type->unknown_name) &&
+           gust_read_texts(load, "equation_names", kernel->n_unknowns, &type->equation_name) &&
+           gust_read_texts(load, "external_names", kernel->n_external, &type->external_name) &&
+           gust_read_texts(load, "flow_names", kernel->n_flows, &type->flow_name) &&
+           gust_read_texts(load, "root_names", kernel->n_roots, &type->root_name) &&
+           gust_read_texts(load, "when_names", kernel->n_whens, &type->when_name) &&
+           gust_read_texts(load, "parameter_names", kernel->n_parameters, &type->parameter_name) &&
+           gust_read_indices(load, "first_unknown", ni, 0, n - kernel->n_unknowns + 1, &type->first_unknown) &&
+           gust_read_indices(load, "external", ni * kernel->n_external, 0, n, &type->external) &&
+           gust_read_indices(load, "flow_row", ni * kernel->n_flows, 0, n, &type->flow_row) &&
+           gust_read_indices(load, "jacobian_position", ni * kernel->n_nonzeros, 0, model->n_nonzeros,
+                             &type->jacobian_position) &&
+           gust_read_indices(load, "first_input", ni, 0, model->n_inputs - kernel->n_inputs + 1,
+                             &type->first_input) &&
+           gust_read_indices(load, "table", ni * kernel->n_tables, 0, model->n_tables, &type->table) &&
+           gust_read_doubles(load, "parameters", ni * kernel->n_parameters, &type->parameters) &&
+           gust_read_finite(load, "discrete", ni * kernel->n_discrete, &type->discrete) &&
+           gust_read_bytes(load, "root_kind", kernel->n_roots, &type->root_kind) &&
+           gust_read_indices(load, "when_root", kernel->n_whens, -1, kernel->n_roots, &type->when_root) &&
+           gust_read_indices(load, "when_period", kernel->n_whens, -1, kernel->n_parameters,
+                             &type->when_period) &&
            check_positions(load, type) && check_parameters(load, type) && check_whens(load, type);
 }
 
 /* Which rows belong to no instance; no unknown may belong to two, no flow may end in an owned row. */
-static bool find_unowned(loader *load)
+static bool find_unowned(gust_reader *load)
 {
     gust_model *model = load->model;
     const int32_t n = model->n_unknowns;
@@ -621,7 +421,7 @@ static bool find_unowned(loader *load)
     model->unowned = gust_allocate((size_t)n, sizeof *model->unowned);
     if (owned == NULL || model->unowned == NULL) {
         gust_release(owned);
-        return no_memory(load);
+        return gust_read_no_memory(load);
     }
     bool good = true;
     for (int32_t t = 0; t < model->n_types && good; ++t) {
@@ -630,8 +430,9 @@ static bool find_unowned(loader *load)
             for (int32_t k = 0; k < type->kernel->n_unknowns && good; ++k) {
                 const int32_t unknown = type->first_unknown[i] + k;
                 if (owned[unknown]) {
-                    good = refuse(load, GUST_BAD_TABLE, "unknown %d belongs to \"%s\" and to another instance",
-                                  unknown, type->instance_name[i]);
+                    good = gust_refuse(load, GUST_BAD_TABLE,
+                                       "unknown %d belongs to \"%s\" and to another instance", unknown,
+                                       type->instance_name[i]);
                 }
                 owned[unknown] = 1;
             }
@@ -642,9 +443,9 @@ static bool find_unowned(loader *load)
         const int64_t n_rows = (int64_t)type->n_instances * type->kernel->n_flows;
         for (int64_t k = 0; k < n_rows && good; ++k) {
             if (owned[type->flow_row[k]]) {
-                good = refuse(load, GUST_BAD_TABLE,
-                              "a flow of \"%s\" is added to row %d, which belongs to an instance",
-                              type->instance_name[k / type->kernel->n_flows], type->flow_row[k]);
+                good = gust_refuse(load, GUST_BAD_TABLE,
+                                   "a flow of \"%s\" is added to row %d, which belongs to an instance",
+                                   type->instance_name[k / type->kernel->n_flows], type->flow_row[k]);
             }
         }
     }
@@ -657,7 +458,7 @@ static bool find_unowned(loader *load)
     return good;
 }
 
-static bool read_schedule(loader *load)
+static bool read_schedule(gust_reader *load)
 {
     gust_model *model = load->model;
     const int64_t n = model->n_schedule;
@@ -665,46 +466,48 @@ static bool read_schedule(loader *load)
     const double *value = NULL;
     const int32_t *target = NULL;
     load->prefix[0] = '\0';
-    if (!finite_doubles(load, "schedule_time", n, &time) || !doubles(load, "schedule_value", n, &value) ||
-        !integers(load, "schedule_target", 3 * n, &target)) {
+    if (!gust_read_finite(load, "schedule_time", n, &time) ||
+        !gust_read_doubles(load, "schedule_value", n, &value) ||
+        !gust_read_integers(load, "schedule_target", 3 * n, &target)) {
         return false;
     }
     model->schedule = gust_allocate((size_t)n, sizeof *model->schedule);
     if (model->schedule == NULL) {
-        return no_memory(load);
+        return gust_read_no_memory(load);
     }
     for (int64_t i = 0; i < n; ++i) {
         const int32_t *to = target + 3 * i;
         if (to[0] < 0 || to[0] >= model->n_types || to[1] < 0 || to[1] >= model->types[to[0]].n_instances ||
             to[2] < 0 || to[2] >= model->types[to[0]].kernel->n_parameters) {
-            return refuse(load, GUST_BAD_TABLE,
-                          "scheduled change %lld has no such target: type %d, instance %d, parameter %d",
-                          (long long)i, to[0], to[1], to[2]);
+            return gust_refuse(load, GUST_BAD_TABLE,
+                               "scheduled change %lld has no such target: type %d, instance %d, parameter %d",
+                               (long long)i, to[0], to[1], to[2]);
         }
         if (isnan(value[i]) || (i > 0 && time[i] < time[i - 1])) {
-            return refuse(load, GUST_BAD_TABLE,
-                          "scheduled change %lld (at %g s, to %g) is not a number or out of order",
-                          (long long)i, time[i], value[i]);
+            return gust_refuse(load, GUST_BAD_TABLE,
+                               "scheduled change %lld (at %g s, to %g) is not a number or out of order",
+                               (long long)i, time[i], value[i]);
         }
         model->schedule[i] = (gust_schedule_entry){time[i], to[0], to[1], to[2], value[i]};
     }
     return true;
 }
 
-static bool read_channels(loader *load)
+static bool read_channels(gust_reader *load)
 {
     gust_model *model = load->model;
     const int64_t n = model->n_channels;
     const int32_t *channel = NULL;
     const char **names = NULL;
     const char **units = NULL;
-    if (!integers(load, "channel", 3 * n, &channel) || !texts(load, "channel_names", n, &names) ||
-        !texts(load, "channel_units", n, &units)) {
+    if (!gust_read_integers(load, "channel", 3 * n, &channel) ||
+        !gust_read_texts(load, "channel_names", n, &names) ||
+        !gust_read_texts(load, "channel_units", n, &units)) {
         return false;
     }
     model->channels = gust_allocate((size_t)n, sizeof *model->channels);
     if (model->channels == NULL) {
-        return no_memory(load);
+        return gust_read_no_memory(load);
     }
     for (int64_t i = 0; i < n; ++i) {
         const int32_t *at = channel + 3 * i;
@@ -722,20 +525,21 @@ static bool read_channels(loader *load)
             good = false;
         }
         if (!good) {
-            return refuse(load, GUST_BAD_TABLE,
-                          "channel \"%s\" (kind %d: %d, %d) does not exist: build the model again", names[i],
-                          at[0], at[1], at[2]);
+            return gust_refuse(load, GUST_BAD_TABLE,
+                               "channel \"%s\" (kind %d: %d, %d) does not exist: build the model again",
+                               names[i], at[0], at[1], at[2]);
         }
         model->channels[i] = (gust_channel){at[0], at[1], at[2], names[i], units[i]};
     }
     return true;
 }
 
-static bool read_model(loader *load)
+static bool read_model(gust_reader *load)
 {
     gust_model *model = load->model;
-    if (!text(load, "metadata", &model->metadata) || !read_counts(load) || !allocate_parts(load) ||
-        !read_pattern(load) || !read_unknowns(load)) {
+    if (!gust_read_text(load, "metadata", &model->metadata) || !read_counts(load) ||
+        !gust_read_sampled_counts(load) || !allocate_parts(load) || !read_pattern(load) ||
+        !read_unknowns(load)) {
         return false;
     }
     for (int32_t k = 0; k < model->n_tables; ++k) {
@@ -753,7 +557,7 @@ static bool read_model(loader *load)
             return false;
         }
     }
-    return find_unowned(load) && read_schedule(load) && read_channels(load);
+    return find_unowned(load) && read_schedule(load) && read_channels(load) && gust_read_sampled(load);
 }
 
 /* Hash of all sections, for telling models apart. What may differ between two builds of the same model is left
@@ -788,7 +592,7 @@ static uint64_t identity_of(const gust_container *container)
 static gust_status build(uint8_t *data, size_t n_bytes, const char *folder, gust_model **model, char *message,
                          size_t size)
 {
-    loader load = {.folder = folder, .message = message, .message_size = size, .status = GUST_OK};
+    gust_reader load = {.folder = folder, .message = message, .message_size = size, .status = GUST_OK};
     load.model = gust_allocate(1, sizeof *load.model);
     if (load.model == NULL) {
         gust_release(data);

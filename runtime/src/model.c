@@ -3,6 +3,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
+#include "controller_library.h"
 #include "kernel_library.h"
 #include "memory.h"
 #include "text.h"
@@ -15,6 +16,12 @@ void gust_model_destroy(gust_model **model)
     gust_model *old = *model;
     for (int32_t t = 0; old->types != NULL && t < old->n_types; ++t) {
         gust_kernel_close(old->types[t].library);
+    }
+    for (int32_t k = 0; old->libraries != NULL && k < old->n_libraries; ++k) {
+        gust_controller_close(old->libraries[k].library);
+    }
+    for (int32_t k = 0; old->sampled != NULL && k < old->n_sampled; ++k) {
+        gust_release(old->sampled[k].measurement);
     }
     for (int64_t k = 0; k < old->n_text_tables; ++k) {
         gust_release(old->text_tables[k]);
@@ -29,6 +36,10 @@ void gust_model_destroy(gust_model **model)
     gust_release(old->tables);
     gust_release(old->schedule);
     gust_release(old->channels);
+    gust_release(old->libraries);
+    gust_release(old->sampled);
+    gust_release(old->sampled_starts);
+    gust_release(old->sampled_changes);
     gust_release(old->unowned);
     gust_release(old->bytes);
     gust_release(old);
@@ -53,6 +64,16 @@ int32_t gust_model_n_channels(const gust_model *model)
 int32_t gust_model_n_series(const gust_model *model)
 {
     return model->n_series;
+}
+
+int32_t gust_model_n_sampled(const gust_model *model)
+{
+    return model->n_sampled;
+}
+
+const gust_sampled_info *gust_model_sampled_block(const gust_model *model, int32_t block)
+{
+    return block >= 0 && block < model->n_sampled ? &model->sampled[block].info : NULL;
 }
 
 int32_t gust_model_n_instances(const gust_model *model)

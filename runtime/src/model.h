@@ -4,6 +4,7 @@
 
 #include <stdint.h>
 
+#include "gustform/gust_controller.h"
 #include "gustform/gust_kernel.h"
 #include "gustform/gust_model.h"
 
@@ -80,6 +81,43 @@ typedef struct gust_channel {
     const char *unit;
 } gust_channel;
 
+/* A shared library with an exported controller; instances of it differ by their contexts alone. */
+typedef struct gust_model_library {
+    const char *path; /* as the table has it */
+    void *library;    /* from dlopen */
+    const gust_controller *controller;
+} gust_model_library;
+
+/* A value that a sampled block measures. */
+typedef struct gust_measurement {
+    int32_t kind; /* as of a channel */
+    int32_t a;    /* unknown; or output ... */
+    int32_t sign; /* +-1 */
+} gust_measurement;
+
+/* A controller beside the equations of one instance: it measures there and holds discrete values there. */
+typedef struct gust_model_sampled {
+    gust_sampled_info info;
+    int32_t type;
+    int32_t instance;
+    int32_t library; /* -1: the host steps it */
+    int32_t n_states;
+    int64_t n_parameters;
+    gust_measurement *measurement; /* [info.n_measurements] */
+    const int32_t *command;        /* [info.n_commands] discrete values of the instance */
+    const double *parameters;      /* of the controller at the start */
+    const double *states;  /* of the controller at the start, one after the other from state_offset on */
+    uint32_t state_offset; /* in the context, bytes */
+} gust_model_sampled;
+
+/* A parameter of a sampled block's controller gets another value. */
+typedef struct gust_sampled_change {
+    double time;
+    int32_t block;
+    int32_t parameter;
+    double value;
+} gust_sampled_change;
+
 struct gust_model {
     uint8_t *bytes;    /* the whole container */
     uint64_t identity; /* hash of everything that a run depends on */
@@ -104,6 +142,13 @@ struct gust_model {
     gust_table *tables;
     gust_schedule_entry *schedule;
     gust_channel *channels;
+    int32_t n_libraries;
+    int32_t n_sampled;
+    int32_t n_sampled_changes;
+    gust_model_library *libraries;
+    gust_model_sampled *sampled;
+    double *sampled_starts; /* commands of all blocks before their first samples */
+    gust_sampled_change *sampled_changes;
     int32_t n_unowned; /* unknowns and rows that belong to no instance: shared potentials and flow sums */
     int32_t *unowned;
     const char *metadata;

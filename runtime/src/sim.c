@@ -31,6 +31,9 @@ gust_status gust_sim_create(const gust_model *model, gust_sim **sim)
     if (status == GUST_OK) {
         status = gust_sampler_create(&made->sampler, &made->system);
     }
+    if (status == GUST_OK) {
+        status = gust_controls_create(&made->controls, model);
+    }
     made->probe.next_time = INFINITY;
     if (status == GUST_OK) {
         status = gust_sink_create(&made->sink, &made->system, NULL);
@@ -61,6 +64,7 @@ void gust_sim_destroy(gust_sim **sim)
     gust_sink_free(&old->sink);
     gust_sink_free(&old->probe);
     gust_sampler_free(&old->sampler);
+    gust_controls_free(&old->controls);
     gust_system_free(&old->system);
     gust_release(old);
     *sim = NULL;
@@ -190,6 +194,45 @@ gust_status gust_sim_set_statistics(gust_sim *sim, gust_stats *stats, double sta
     return status;
 }
 
+static gust_status block_exists(gust_sim *sim, int32_t block)
+{
+    if (block >= 0 && block < sim->controls.n_controls) {
+        return GUST_OK;
+    }
+    gust_text(sim->message, sizeof sim->message,
+              "there is no sampled block %d: the model has %d, counted from 0", block,
+              sim->controls.n_controls);
+    return GUST_BAD_ARGUMENT;
+}
+
+gust_status gust_sim_set_sampled(gust_sim *sim, int32_t block, gust_sampled_step step, void *context)
+{
+    if (sim == NULL) {
+        return GUST_BAD_ARGUMENT;
+    }
+    gust_status status = only_before(sim, "setting the controller of a sampled block");
+    if (status == GUST_OK) {
+        status = block_exists(sim, block);
+    }
+    if (status == GUST_OK) {
+        sim->controls.control[block].step = step;
+        sim->controls.control[block].host = context;
+    }
+    return status;
+}
+
+gust_status gust_sim_sampled_statistics(gust_sim *sim, int32_t block, gust_sampled_statistics *statistics)
+{
+    if (sim == NULL || statistics == NULL) {
+        return GUST_BAD_ARGUMENT;
+    }
+    const gust_status status = block_exists(sim, block);
+    if (status == GUST_OK) {
+        *statistics = sim->controls.control[block].statistics;
+    }
+    return status;
+}
+
 /* -- run ------------------------------------------------------------------------------------------------ */
 
 static gust_status prepare(gust_sim *sim, double t0)
@@ -232,6 +275,10 @@ static gust_status prepare(gust_sim *sim, double t0)
         gust_text(message, size, "the sample period %s.%s is not a positive number: it must be greater than 0",
                   type->instance_name[bad->instance], type->parameter_name[bad->parameter]);
         return GUST_BAD_PERIOD;
+    }
+    status = gust_controls_start(&sim->controls, &sim->system, t0, message, size);
+    if (status != GUST_OK) {
+        return status;
     }
     sim->next_event = gust_next_event(sim);
     const size_t bytes = (size_t)model->n_unknowns * sizeof(double);

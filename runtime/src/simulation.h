@@ -5,6 +5,7 @@
 #include <stdatomic.h>
 #include <stdbool.h>
 
+#include "controls.h"
 #include "events.h"
 #include "gustform/gust_sim.h"
 #include "initial.h"
@@ -27,6 +28,7 @@ struct gust_sim {
     gust_options options;
     gust_system system;
     gust_sampler sampler;
+    gust_controls controls;
     gust_events events;
     gust_solver solver;
     gust_initial initial;

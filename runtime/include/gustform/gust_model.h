@@ -43,6 +43,28 @@ GUST_API const char *gust_model_channel_unit(const gust_model *model, int32_t ch
 GUST_API const char *gust_model_series_name(const gust_model *model, int32_t series);
 GUST_API const char *gust_model_metadata(const gust_model *model);
 
+/* A sampled block: the controller of one instance, outside of the equations. At each sample, start + k period,
+ * it gets the measurements and gives the commands, which are held until they change again. `real_size` is that
+ * of its number type: measurements and commands are rounded to it (4: float, 8: double). With a `delay` of 1
+ * sample the commands of sample k act from sample k + 1 on. Texts and arrays belong to the model. */
+typedef struct gust_sampled_info {
+    const char *name; /* of the instance: "wt[3]" */
+    double period;    /* s */
+    int32_t delay;    /* samples, 0 or 1 */
+    int32_t real_size;
+    int32_t n_measurements;
+    int32_t n_commands;
+    const char *const *measurement_name; /* [n_measurements] */
+    const char *const *measurement_unit;
+    const char *const *command_name; /* [n_commands] */
+    const char *const *command_unit;
+    const double *command_start; /* [n_commands] held before the first sample */
+} gust_sampled_info;
+
+GUST_API int32_t gust_model_n_sampled(const gust_model *model);
+/* Block number `block`, NULL past the end. */
+GUST_API const gust_sampled_info *gust_model_sampled_block(const gust_model *model, int32_t block);
+
 /* Name of an unknown ("turbine.rotor.w") and of the equation in a row, for messages; cut to size. */
 GUST_API void gust_model_unknown_name(const gust_model *model, int32_t unknown, char *text, size_t size);
 GUST_API void gust_model_equation_name(const gust_model *model, int32_t row, char *text, size_t size);

@@ -39,6 +39,22 @@ typedef int (*gust_series_reader)(void *context, int64_t first, int64_t count, d
  * one to report a failure. */
 typedef int (*gust_row_sink)(void *context, int64_t rows, const double *time, const float *values);
 
+/* One sample of a sampled block in place of the model's own controller: measurements[n_measurements] at `time`
+ * (s) in, commands[n_commands] out, which on entry hold what the sample before gave. Returns 0, a positive
+ * number to stop the run, a negative one to report a failure. Numbers are rounded to the block's number type on
+ * either side. */
+typedef int (*gust_sampled_step)(void *context, double time, const double *measurements, double *commands);
+
+enum { GUST_SAMPLED_ERRORS = 8 };
+
+/* How a sampled block has fared. */
+typedef struct gust_sampled_statistics {
+    int64_t samples;
+    int64_t bad_samples;                 /* with an error signal other than 0 */
+    int64_t errors[GUST_SAMPLED_ERRORS]; /* samples with that bit of it set, least first */
+    double first_error;                  /* time of the first bad sample, s; NaN: none */
+} gust_sampled_statistics;
+
 typedef struct gust_statistics {
     int64_t steps;                /* accepted steps */
     int64_t residual_evaluations; /* of the whole system */
@@ -96,6 +112,15 @@ GUST_API gust_status gust_sim_set_sink(gust_sim *sim, double interval, int32_t b
  * worked out. It stays the caller's and must outlive the simulation; results may be asked for between two
  * advances. NULL: none. */
 GUST_API gust_status gust_sim_set_statistics(gust_sim *sim, gust_stats *stats, double start);
+
+/* Before initialise: `step` takes the place of the controller of a sampled block (counted from 0, see
+ * gust_model_sampled_block). NULL: the model's own again. `context` stays the caller's; a checkpoint holds
+ * nothing of it. */
+GUST_API gust_status gust_sim_set_sampled(gust_sim *sim, int32_t block, gust_sampled_step step, void *context);
+
+/* Samples and errors of a sampled block so far. */
+GUST_API gust_status gust_sim_sampled_statistics(gust_sim *sim, int32_t block,
+                                                 gust_sampled_statistics *statistics);
 
 /* Finds consistent values at t0 (s), starting from the start values of the model. */
 GUST_API gust_status gust_sim_initialise(gust_sim *sim, double t0);

@@ -25,6 +25,7 @@ extern "C" {
     X(STOP_REQUESTED, 1, "stopped because a stop was requested")                                               \
     X(END_OF_DATA, 2, "stopped because a time series has no more data")                                        \
     X(SINK_STOPPED, 3, "stopped because the receiver of the results asked for it")                             \
+    X(CONTROLLER_STOPPED, 4, "stopped because the host's controller asked for it")                             \
     X(BAD_ARGUMENT, -1, "an argument is outside its range")                                                    \
     X(BAD_ORDER, -2, "the call is not possible in this phase of the simulation")                               \
     X(UNKNOWN_OPTION, -3, "there is no option of this name")                                                   \
@@ -33,6 +34,7 @@ extern "C" {
     X(BAD_CONTAINER, -102, "the model file is damaged or not a model file")                                    \
     X(BAD_TABLE, -103, "the model file contradicts itself")                                                    \
     X(BAD_KERNEL, -104, "a kernel library cannot be used")                                                     \
+    X(BAD_CONTROLLER, -105, "a controller library cannot be used")                                             \
     X(NOT_FINITE, -201, "an equation gives a value that is not a number at the start")                         \
     X(SINGULAR, -202, "the equations do not determine the initial values")                                     \
     X(NOT_CONSISTENT, -203, "no consistent initial values found")                                              \
@@ -45,6 +47,7 @@ extern "C" {
     X(CHATTERING, -402, "events follow each other without the time advancing")                                 \
     X(RESTART_FAILED, -403, "no consistent values found after an event")                                       \
     X(BAD_PERIOD, -404, "a sample period is not a positive number")                                            \
+    X(CONTROLLER_FAILED, -405, "a sampled controller failed")                                                  \
     X(SERIES_UNREADABLE, -501, "a time series cannot be read")                                                 \
     X(BAD_SERIES, -502, "a time series contains an unusable sample")                                           \
     X(SERIES_NOT_COVERING, -503, "a time series begins after the start of the simulation")                     \
