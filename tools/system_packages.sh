@@ -3,21 +3,25 @@
 # SuiteSparse with their headers, and Python's venv. Whatever is missing is installed by apt where this user may do
 # so (as root or by sudo without a password); otherwise the line to run is printed and the script ends with status 1.
 #
-#   tools/system_packages.sh [--print] [--python PROGRAM] [--tests]
+#   tools/system_packages.sh [--print] [--python PROGRAM] [--tests] [--realtime]
 #
 #   --print    only print the line that installs everything, whether missing or not
 #   --python   the Python that the virtual environment is made from (default: python3)
-#   --tests    also what the tests need (cmocka, cppcheck, a compiler and an emulator for Cortex-M)
+#   --tests    also what the tests need: cmocka, cppcheck, a compiler and an emulator for Cortex-M, clang with libFuzzer,
+#              user-mode Linux with can-utils and iproute2 for the tests on a CAN bus
+#   --realtime also what make hil-realtime needs: the emulator of a PC
 set -euo pipefail
 
 print_only=no
 python=python3
 tests=no
+realtime=no
 while [ $# -gt 0 ]; do
     case "$1" in
         --print) print_only=yes ;;
         --python) python=${2:?"--python needs a program"}; shift ;;
         --tests) tests=yes ;;
+        --realtime) realtime=yes ;;
         *) echo "$0: unknown argument '$1'" >&2; exit 2 ;;
     esac
     shift
@@ -25,7 +29,11 @@ done
 
 always=(build-essential cmake ninja-build libsundials-dev libsuitesparse-dev python3-venv)
 if [ "$tests" = yes ]; then
-    always+=(libcmocka-dev cppcheck gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm)
+    always+=(libcmocka-dev cppcheck gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm clang libclang-rt-dev)
+    always+=(user-mode-linux can-utils iproute2)
+fi
+if [ "$realtime" = yes ]; then
+    always+=(qemu-system-x86)
 fi
 if [ "$print_only" = yes ]; then
     echo "sudo apt-get install --no-install-recommends ${always[*]}"
@@ -47,6 +55,15 @@ have_header() {
         fi
     done
     return 1
+}
+
+# True if the cross compiler has a C library to link with; without one it names the file and no path.
+have_newlib() { [[ $(arm-none-eabi-gcc -print-file-name=libc.a 2>/dev/null) == */* ]]; }
+
+# True if clang links a fuzz target: Debian keeps libFuzzer and the sanitizers in a package beside clang.
+have_fuzzer() {
+    printf '#include <stddef.h>\n#include <stdint.h>\nint LLVMFuzzerTestOneInput(const uint8_t *d, size_t n) { return !d && n; }' |
+        clang -fsanitize=fuzzer,address,undefined -x c - -o /dev/null >/dev/null 2>&1
 }
 
 if ! have_program "$python"; then
@@ -78,8 +95,16 @@ if [ "$tests" = yes ]; then
     have_program cppcheck || missing+=(cppcheck)
     # The exported controllers on emulated Cortex-M boards.
     have_program arm-none-eabi-gcc || missing+=(gcc-arm-none-eabi)
-    [ -n "$(arm-none-eabi-gcc -print-file-name=libc.a 2>/dev/null | grep /)" ] || missing+=(libnewlib-arm-none-eabi)
+    have_newlib || missing+=(libnewlib-arm-none-eabi)
     have_program qemu-system-arm || missing+=(qemu-system-arm)
+    have_program clang || missing+=(clang)
+    have_fuzzer || missing+=(libclang-rt-dev)
+    have_program linux.uml || missing+=(user-mode-linux)
+    have_program cangen || missing+=(can-utils)
+    PATH=$PATH:/usr/sbin:/sbin have_program tc || missing+=(iproute2)
+fi
+if [ "$realtime" = yes ]; then
+    have_program qemu-system-x86_64 || missing+=(qemu-system-x86)
 fi
 
 if [ ${#missing[@]} -eq 0 ]; then
