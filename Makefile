@@ -85,6 +85,12 @@ test-python: setup-dev ## Python tests on all cores; ARGS=... goes to pytest
 bench: setup-dev ## Speed as ratios against a bare program and against CasADi
 	@$(BIN)/python -m tests.bench $(ARGS)
 
+.PHONY: pil
+pil: setup-dev ## Exported controllers on emulated Cortex-M4F and M7: bits, instructions, memory
+	$(call say,gustform hil pil)
+	@$(BIN)/gustform hil pil --out build/pil.json $(ARGS)
+	@echo build/pil.json
+
 .PHONY: docs
 docs: ## Build the documents into docs/_build/html
 	$(SET_UP) $(VENV_STAMPS)/docs

@@ -17,6 +17,11 @@ def bridge_folder() -> Path:
     return _folder("bridge")
 
 
+def pil_folder() -> Path:
+    """The folder of the C that runs a controller on an emulated board."""
+    return _folder("pil")
+
+
 def _folder(name: str) -> Path:
     inside = _HERE / name
     return inside if inside.is_dir() else _HERE.parent / name

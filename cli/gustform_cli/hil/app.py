@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Annotated
+
 import typer
+
+from gustform_cli.exits import FAILED, guarded
 
 hil = typer.Typer(
     name="hil",
@@ -14,6 +19,39 @@ hil = typer.Typer(
 )
 
 
+Json = Annotated[bool, typer.Option("--json", help="print the result as JSON on stdout")]
+
+
 @hil.callback()
 def group() -> None:
     """The controller on the bus: bridge, plant, faults, logs."""
+
+
+@hil.command()
+def pil(
+    scenario: Annotated[
+        Path | None, typer.Argument(metavar="SCENARIO.yaml", help="where samples are measured [the load step at 8 m/s]")
+    ] = None,
+    turbine: Annotated[str, typer.Option(metavar="NAME", help="turbine of the scenario")] = "wt",
+    control: Annotated[
+        list[str] | None, typer.Option(metavar="NAME", help="a control, more than once for several [all]")
+    ] = None,
+    begin: Annotated[float, typer.Option(metavar="S", help="time of the first sample, s")] = 28.0,
+    samples: Annotated[int, typer.Option(min=1, help="samples, one each ms")] = 4000,
+    overrides: Annotated[
+        list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="change one value of the scenario")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="also write the result as JSON")] = None,
+    json: Json = False,
+) -> None:
+    """Run exported controllers on emulated Cortex-M4F and Cortex-M7; 1 if a bit differs from this computer's."""
+    with guarded():
+        from gustform_cli.hil import pil as boards
+        from gustform_cli.writing import write_text
+
+        found = boards.pil(scenario or boards.SCENARIO, turbine, control or [], begin, samples, overrides or [])
+        print(boards.as_json(found) if json else boards.as_text(found))
+        if out is not None:
+            write_text(out, boards.as_json(found))
+        if not all(one.equal for one in found):
+            raise typer.Exit(FAILED)
