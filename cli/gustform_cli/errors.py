@@ -27,31 +27,6 @@ GF7008 checkpoint damaged
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Iterable, Sequence
+from gustform.language.errors import ErrorList, did_you_mean
 
-from gustform.language.errors import GustformError
-
-
-class ErrorList(Exception):
-    """Several errors found in one go; never empty."""
-
-    def __init__(self, errors: Sequence[GustformError]) -> None:
-        self.errors = tuple(errors)
-        super().__init__("\n".join(str(error) for error in self.errors))
-
-
-def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """A hint for `name`, which is none of `known`: the closest of them, or the list of them."""
-    names = sorted(set(known))
-    # Case first: "pmsgturbine" for "PmsgTurbine" is the commonest slip and difflib rates it low.
-    close = [other for other in names if other.lower() == name.lower()]
-    close = close or difflib.get_close_matches(name, names, n=2, cutoff=0.6)
-    if close:
-        return " or ".join(close)
-    if not names:
-        return ""
-    if len(names) == 1:
-        return names[0]
-    shown = names[:12]
-    return "one of " + ", ".join(shown) + (", ..." if len(names) > len(shown) else "")
+__all__ = ["ErrorList", "did_you_mean"]
