@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -18,13 +19,55 @@ hil = typer.Typer(
     rich_markup_mode=None,
 )
 
-
 Json = Annotated[bool, typer.Option("--json", help="print the result as JSON on stdout")]
+
+
+class Bus(StrEnum):
+    """The shipped message sets."""
+
+    fd = "fd"
+    classic = "classic"
 
 
 @hil.callback()
 def group() -> None:
     """The controller on the bus: bridge, plant, faults, logs."""
+
+
+@hil.command()
+def budget(
+    bus: Annotated[Bus, typer.Option(help="which of the shipped databases")] = Bus.fd,
+    dbc: Annotated[Path | None, typer.Option(metavar="FILE", help="a database of your own instead")] = None,
+    mapping: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="its mapping.yaml, where that has other cycle times")
+    ] = None,
+    bitrate: Annotated[
+        str | None, typer.Option(metavar="RATE", help="of the arbitration [500k with FD frames, else 1M]")
+    ] = None,
+    data_bitrate: Annotated[str, typer.Option(metavar="RATE", help="of the data of FD frames")] = "2M",
+    event_distance: Annotated[
+        str, typer.Option(metavar="TIME", help="least distance of two messages of a kind that are not cyclic")
+    ] = "10 ms",
+    jitter: Annotated[str, typer.Option(metavar="TIME", help="how late any sender may queue a frame")] = "0",
+    errors_every: Annotated[
+        str | None, typer.Option(metavar="TIME", help="least distance of two errors on the wire [no errors]")
+    ] = None,
+    every_rate: Annotated[bool, typer.Option("--all", help="one line for each usual pair of bit rates")] = False,
+    json: Json = False,
+) -> None:
+    """Bus load and worst-case response times of a message set; 1 if a message can miss its deadline."""
+    with guarded():
+        from gustform_cli.hil import budget as budgets
+        from gustform_hil.budget import refuse
+
+        request = budgets.Request(bus.value, dbc, mapping, bitrate, data_bitrate, event_distance, jitter, errors_every)
+        if every_rate:
+            found = budgets.survey(request)
+            print(budgets.survey_json(found) if json else budgets.survey_text(found))
+            return
+        one = budgets.budget_of(request)
+        print(budgets.as_json(one) if json else budgets.as_text(one))
+        refuse(one)
 
 
 @hil.command()
