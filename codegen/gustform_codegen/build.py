@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Hashable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from gustform.language.component import Component, suggest
@@ -15,6 +15,7 @@ from gustform_codegen.cache import KernelCache
 from gustform_codegen.emit.kernel import Kernel, emit_kernel
 from gustform_codegen.flatten import flatten
 from gustform_codegen.link import Linked, link
+from gustform_codegen.sampled import continuous, sampled_blocks
 from gustform_codegen.unit_type import UnitType
 
 # Unit types flattened by this process: (structure, signals, kept variables) -> type and kernel text.
@@ -87,6 +88,17 @@ def build(system: System, cache: KernelCache) -> Built:
                     f"input {path} is not driven ({declaration.description}, {declaration.unit})",
                     hint=f"wind: {{{name}: ...}}" if label == "wind" else f"a signal or a source for {path}",
                 )
+    linked = link(system, _types(system, cache))
+    twin = continuous(system)
+    if twin is not system:
+        # Never run, so that its kernels need not be compiled.
+        linked = replace(linked, twin=link(twin, _types(twin, None)))
+        linked = replace(linked, table=replace(linked.table, sampled=sampled_blocks(linked, cache)))
+    return Built(linked, cache.compilations - compiled_before, time.perf_counter() - begin)
+
+
+def _types(system: System, cache: KernelCache | None) -> list[tuple[UnitType, Kernel, str, list[str]]]:
+    """The types of a system with the paths of their kernels, "" without a cache, and the names of their instances."""
     wired = _wired_inputs(system)
     kept = _kept(system, wired)
     groups: dict[Hashable, list[str]] = {}
@@ -100,6 +112,5 @@ def build(system: System, cache: KernelCache) -> Built:
     for names in groups.values():
         first = names[0]
         unit, kernel = unit_type(system.components[first], wired.get(first, frozenset()), kept.get(first, frozenset()))
-        types.append((unit, kernel, str(cache.get(kernel.text, unit.name)), names))
-    linked = link(system, types)
-    return Built(linked, cache.compilations - compiled_before, time.perf_counter() - begin)
+        types.append((unit, kernel, "" if cache is None else str(cache.get(kernel.text, unit.name)), names))
+    return types

@@ -6,8 +6,9 @@ import hashlib
 import os
 import platform
 import tempfile
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 
 from gustform.language.errors import GustformError
@@ -50,18 +51,32 @@ class KernelCache:
     def get(self, source: str, type_name: str) -> Path:
         """The shared library for a kernel's C text, compiled if it is not there whole. GF4005 without a folder."""
         path = self.folder / "kernels" / f"{self.key(source)}.so"
-        if not _intact(path):
-            try:
-                toolchain.compile_kernel(source, path, self.include, type_name)
-                _seal(path)
-            except OSError as failure:
-                raise GustformError(
-                    "GF4005",
-                    f"compiled kernels cannot be kept in {path.parent}: {failure}",
-                    hint="GUSTFORM_CACHE=/a/folder/to/write/to",
-                ) from failure
-            self.compilations += 1
+        self._provide(path, partial(toolchain.compile_kernel, source, path, self.include, type_name))
         return path
+
+    def controller(self, sources: Mapping[str, str], name: str) -> Path:
+        """The shared library of an exported controller, from its files by name, the controller's own first."""
+        flags = " ".join(toolchain.CONTROLLER_FLAGS)
+        parts = [f"{file}\0{text}" for file, text in sources.items()]
+        hashed = "\0".join([*parts, toolchain.find_compiler().version, flags, platform.machine()])
+        path = self.folder / "controllers" / f"{hashlib.sha256(hashed.encode()).hexdigest()[:32]}.so"
+        self._provide(path, partial(toolchain.compile_controller, sources, path, name))
+        return path
+
+    def _provide(self, path: Path, compile_it: Callable[[], None]) -> None:
+        """Compile what is not there whole."""
+        if _intact(path):
+            return
+        try:
+            compile_it()
+            _seal(path)
+        except OSError as failure:
+            raise GustformError(
+                "GF4005",
+                f"compiled kernels cannot be kept in {path.parent}: {failure}",
+                hint="GUSTFORM_CACHE=/a/folder/to/write/to",
+            ) from failure
+        self.compilations += 1
 
 
 def _digest(path: Path) -> str:

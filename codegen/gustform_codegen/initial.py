@@ -21,6 +21,7 @@ from gustform.language.errors import GustformError
 from gustform_codegen.evaluate import Array, TypeEvaluator
 from gustform_codegen.link import Linked, LinkedType
 from gustform_codegen.newton import newton
+from gustform_codegen.sampled_start import held_start
 from gustform_codegen.table import SystemTable
 from gustform_codegen.unit_type import UnitType
 
@@ -256,7 +257,11 @@ class _Jacobian(ca.Callback):
 
 
 def steady_state(linked: Linked, max_iterations: int = 300) -> SteadyState:
-    """Solve for the steady state; GF5001 with the worst rows and the bounds that are hit when there is none."""
+    """Solve for the steady state; GF5001 with the worst rows and the bounds that are hit when there is none. With
+    sampled controllers it is that of the continuous ones."""
+    if linked.twin is not None:
+        steady = steady_state(linked.twin, max_iterations)
+        return replace(steady, table=held_start(linked, steady.table, steady.free))
     for t in linked.types:
         if t.unit not in _looked_at:
             _refuse_computed_from_free(t)

@@ -49,6 +49,7 @@ class Linked:
     shared_names: list[str]  # one name for each shared unknown
     operating_input: np.ndarray[Any, np.dtype[np.float64]]
     index_of: dict[str, tuple[int, int]] = field(repr=False, default_factory=dict)  # instance -> (type, number)
+    twin: Linked | None = None  # with every control in the equations, if there are sampled ones
 
     def unknown_name(self, index: int) -> str:
         """The name of a global unknown."""

@@ -67,6 +67,69 @@ class LookupTable:
 
 
 @dataclass(frozen=True, eq=False)
+class SampledTable:
+    """A controller beside the equations of one instance: what it measures there, and the discrete values it holds.
+
+    `paths` are what the values of its parameters and states are called in the continuous unit.
+    """
+
+    name: str
+    type: int
+    instance: int
+    library: int
+    delay: int
+    real_size: int
+    state_offset: int  # in the context, bytes
+    period: float
+    measurement: Ints  # (m, 3): kind of channel, unknown or output, sign
+    command: Ints  # discrete values of the instance
+    parameters: Floats
+    states: Floats
+    measurement_names: list[str]
+    measurement_units: list[str]
+    command_names: list[str]
+    command_units: list[str]
+    parameter_paths: list[str]
+    state_paths: list[str]
+
+
+@dataclass(frozen=True, eq=False)
+class Sampled:
+    """All sampled blocks, the libraries they share, and scheduled changes (time, block, parameter, value)."""
+
+    libraries: list[str] = field(default_factory=list)
+    blocks: list[SampledTable] = field(default_factory=list)
+    changes: list[tuple[float, int, int, float]] = field(default_factory=list)
+
+    def sections(self) -> Sections:
+        """Their sections; none where there are none."""
+        if not self.blocks:
+            return {}
+        counts = [len(self.libraries), len(self.blocks), len(self.changes)]
+        s: Sections = {
+            "sampled": np.array(counts, dtype=np.int32),
+            "sampled_change_time": np.array([c[0] for c in self.changes], dtype=np.float64),
+            "sampled_change_target": np.array([c[1:3] for c in self.changes], dtype=np.int32).ravel(),
+            "sampled_change_value": np.array([c[3] for c in self.changes], dtype=np.float64),
+        }
+        for k, path in enumerate(self.libraries):
+            s[f"library.{k}.path"] = strings([path])
+        for k, b in enumerate(self.blocks):
+            p = f"sampled.{k}."
+            s[p + "name"] = strings([b.name])
+            s[p + "kind"] = np.array(
+                [b.type, b.instance, b.library, b.delay, b.real_size, b.state_offset], dtype=np.int32
+            )
+            s[p + "period"] = np.array([b.period])
+            s[p + "measurement"] = b.measurement.ravel()
+            for name in ("command", "parameters", "states"):
+                s[p + name] = getattr(b, name)
+            for name in ("measurement_names", "measurement_units", "command_names", "command_units"):
+                s[p + name] = strings(getattr(b, name))
+        return s
+
+
+@dataclass(frozen=True, eq=False)
 class Channel:
     """A recorded quantity: kind 0 unknown `a`; kind 1 output `b` of instance `a` (counted through all types)."""
 
@@ -95,6 +158,7 @@ class SystemTable:
     schedule_time: Floats
     schedule_target: Ints
     schedule_value: Floats
+    sampled: Sampled = field(default_factory=Sampled)
     channels: list[Channel] = field(default_factory=list)
     metadata: dict[str, Any] = field(default_factory=dict)
 
@@ -171,4 +235,4 @@ class SystemTable:
             s[p + "grid"] = np.array([spline["x_start"], spline["x_step"], spline["y_start"], spline["y_step"]])
             s[p + "size"] = np.array([spline["n_x"], spline["n_y"]], dtype=np.int32)
             s[p + "coefficient"] = spline["coefficient"]
-        return pack(s)
+        return pack(s | self.sampled.sections())

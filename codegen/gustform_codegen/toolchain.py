@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import tempfile
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -56,14 +57,31 @@ def _find(wanted: str | None, search: str | None) -> Compiler:
     )
 
 
+# An exported controller: the same bits on every machine, so no fused multiply-add and nothing of this machine's own.
+CONTROLLER_FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-DGUST_CONTROLLER_LIBRARY")
+
+
 def compile_kernel(source: str, target: Path, include: Path, type_name: str) -> None:
     """Compile a kernel to `target` (put in place atomically). GF4002 with the compiler's words when it fails."""
+    _compile({"kernel.c": source}, (*FLAGS, f"-I{include}"), target, f"type {type_name}")
+
+
+def compile_controller(sources: Mapping[str, str], target: Path, name: str) -> None:
+    """Compile the C files of an exported controller to the shared library `target`, as compile_kernel does."""
+    _compile(sources, CONTROLLER_FLAGS, target, f"controller {name}")
+
+
+def _compile(sources: Mapping[str, str], flags: Sequence[str], target: Path, what: str) -> None:
+    """`sources` by file name; the first one is kept beside the library."""
     compiler = find_compiler()
     target.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="gustform-", dir=target.parent) as folder:
-        c_file, so_file = Path(folder) / "kernel.c", Path(folder) / "kernel.so"
-        c_file.write_text(source, encoding="utf-8")
-        command = [compiler.path, *FLAGS, f"-I{include}", str(c_file), "-o", str(so_file), "-lm"]
+        files = [Path(folder) / name for name in sources]
+        so_file = Path(folder) / "library.so"
+        for file, text in zip(files, sources.values(), strict=True):
+            file.write_text(text, encoding="utf-8")
+        units = [str(file) for file in files if file.suffix == ".c"]
+        command = [compiler.path, *flags, *units, "-o", str(so_file), "-lm"]
         try:
             run = subprocess.run(
                 command, capture_output=True, text=True, check=False, timeout=600, stdin=subprocess.DEVNULL
@@ -71,19 +89,19 @@ def compile_kernel(source: str, target: Path, include: Path, type_name: str) -> 
         except (OSError, subprocess.TimeoutExpired) as failure:
             raise GustformError(
                 "GF4002",
-                f"the C compiler {compiler.path} could not be run for {type_name}: {failure}",
+                f"the C compiler {compiler.path} could not be run for {what}: {failure}",
                 hint="CC=gcc",
             ) from failure
         if run.returncode != 0 or not so_file.exists():
             kept = target.with_suffix(".failed.c")
-            shutil.copyfile(c_file, kept)
+            shutil.copyfile(files[0], kept)
             lines = (run.stderr or run.stdout or f"exit code {run.returncode}").strip().splitlines()
             raise GustformError(
                 "GF4002",
-                f"the C compiler {compiler.path} failed on type {type_name}: {' | '.join(lines[:3])}; "
+                f"the C compiler {compiler.path} failed on {what}: {' | '.join(lines[:3])}; "
                 f"the source is kept in {kept}",
                 hint="CC=gcc, or a newer compiler",
             )
         # The source stays beside the library, for whoever wants to read what was compiled.
-        c_file.replace(target.with_suffix(".c"))
+        files[0].replace(target.with_suffix(".c"))
         so_file.replace(target)

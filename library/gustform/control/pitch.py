@@ -60,3 +60,21 @@ class PitchControl(Component):
         self.eq(self.beta_ref, limit(demand, self.beta_min, self.beta_max))
         self.connect(servo.beta_ref, self.beta_ref)
         self.connect(self.beta, servo.beta)
+
+
+class HeldPitchDemand(PitchControl):
+    """The pitch servo with a demand that a sampled controller holds.
+
+        beta_ref held,   beta by the servo
+
+    The rest of the pitch control is part of that controller. Source: see PitchControl.
+    """
+
+    kept_parts = ("servo",)
+
+    def held(self) -> tuple[str, ...]:
+        return ("beta_ref",)
+
+    def held_equations(self) -> None:
+        self.connect(self.servo.beta_ref, self.beta_ref)
+        self.connect(self.beta, self.servo.beta)

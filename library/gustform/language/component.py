@@ -282,6 +282,20 @@ class Component:
                 key.append((name, self.part(name).structure_key()))
         return tuple(key)
 
+    # ---- held between samples ----
+    kept_parts: ClassVar[tuple[str, ...]] = ()  # those that a component which holds values has in the system
+
+    def held(self) -> tuple[str, ...]:
+        """Variables and outputs whose values come from a controller outside of the equations, held between its samples.
+
+        If there are any, the system has these values as discrete ones, the component's inputs and outputs, its
+        `kept_parts`, and `held_equations` in the place of `equations`: no other variable, parameter or part of it.
+        """
+        return ()
+
+    def held_equations(self) -> None:
+        """Equations of a component that holds values."""
+
     # ---- equations ----
     def equations(self) -> None:
         """Written by subclasses: `self.eq(...)`, `self.connect(...)`, `self.initial(...)`, `self.when(...)`."""
@@ -314,6 +328,6 @@ class Component:
         values (`assign`) and states (`reinit`). The right-hand sides see the values before the event."""
         self._need_scope().add_when(condition, assign or {}, reinit or {}, _caller(": "))
 
-    def sampled(self, period: Any, assign: dict[Any, Any], *, reinit: dict[Any, Any] | None = None) -> None:
+    def sample(self, period: Any, assign: dict[Any, Any], *, reinit: dict[Any, Any] | None = None) -> None:
         """Every `period` (a parameter in s): set discrete values; the block of a sampled controller."""
         self._need_scope().add_sampled(period, assign, reinit or {}, _caller(": "))

@@ -177,7 +177,7 @@ class Input(Variable):
 
 
 class Discrete(Declaration):
-    """A value that changes only at events (`when`, `sampled`) and is constant between them."""
+    """A value that changes only at events (`when`, `sample`) and is constant between them."""
 
     def __init__(self, unit: str, description: str, *, start: Value = 0.0) -> None:
         super().__init__(unit, description)

@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -125,11 +125,16 @@ class Scope:
         )
         return symbol
 
-    def declare(self) -> None:
-        """Make the symbols of every declaration except parts."""
+    def declare(self, held: Sequence[str] = ()) -> None:
+        """Make the symbols of every declaration except parts. Where values are held: of those, inputs and outputs."""
         for name, declaration in self.component.declarations().items():
             label = self._label(name)
-            if isinstance(declaration, Parameter):
+            if name in held:
+                assert isinstance(declaration, Variable)
+                self._items[name] = self._new(declaration, label, "discrete")
+            elif held and not _stays(declaration):
+                continue
+            elif isinstance(declaration, Parameter):
                 if declaration.structural:
                     self._items[name] = self.component.value(name)
                 else:
@@ -244,10 +249,17 @@ class Scope:
         )
 
 
+def _stays(declaration: AnyDeclaration) -> bool:
+    """Whether a component that holds values has this one in the system."""
+    if isinstance(declaration, Parameter):
+        return declaration.structural
+    return isinstance(declaration, Input | Output | Connector)
+
+
 def elaborate(component: Component) -> Elaborated:
     """The symbols and equations of a unit. The component itself is not changed."""
     elaborated = Elaborated(component)
-    views: list[Component] = []
+    views: list[tuple[Component, bool]] = []
 
     def view_of(numeric: Component) -> Component:
         view = object.__new__(type(numeric))
@@ -255,16 +267,20 @@ def elaborate(component: Component) -> Elaborated:
         view._numbers = {}
         scope = Scope(elaborated, numeric)
         view._scope = scope
-        scope.declare()
+        held = numeric.held()
+        scope.declare(held)
         for name, declaration in numeric.declarations().items():
-            if isinstance(declaration, Part):
+            if isinstance(declaration, Part) and (not held or name in numeric.kept_parts):
                 scope.add_part(name, view_of(numeric.part(name)))
-        views.append(view)
+        views.append((view, bool(held)))
         return view
 
     view_of(component)
-    for view in views:
-        view.equations()
+    for view, holds in views:
+        if holds:
+            view.held_equations()
+        else:
+            view.equations()
     return elaborated
 
 

@@ -19,7 +19,7 @@ from gustform.control.operating_point import (
     operating_point,
     power_at,
 )
-from gustform.control.pitch import PitchControl
+from gustform.control.pitch import HeldPitchDemand, PitchControl
 from gustform.control.schedule import FixedPoint, OperatingSchedule
 from gustform.conventions import NOMINAL_FREQUENCY, active_power, reactive_power
 from gustform.electrical.dc_link import DcLink
@@ -196,6 +196,8 @@ class PmsgTurbine(Component):
     pitch = Part(
         PitchControl,
         "pitch control",
+        select=lambda self: HeldPitchDemand if self.control.sampled > 0.0 else PitchControl,
+        among=(HeldPitchDemand,),
         beta_start=lambda self: self.beta_del,
         K_p=lambda self: self.K_p,
         omega_max=lambda self: self.omega_max,

@@ -114,7 +114,7 @@ class Everything(Component):
         self.when(
             ca.logic_or(self.u > 0, ca.logic_not(self.x > 2)), {self.d2: ca.ceil(self.u) + ca.copysign(self.x, self.u)}
         )
-        self.sampled(self.T, {self.d: self.d + 1})
+        self.sample(self.T, {self.d: self.d + 1})
 
 
 class _View:

@@ -155,12 +155,12 @@ def test_reinit_of_what_is_no_state() -> None:
 
 
 def test_sampled_blocks_know_their_period() -> None:
-    unit = with_events(lambda c: c.sampled(c.T, {c.d: c.d + c.x}))
+    unit = with_events(lambda c: c.sample(c.T, {c.d: c.d + c.x}))
     assert unit.roots == []
     assert unit.whens[0].root == -1
     assert unit.parameters[unit.whens[0].period].path == "T"
     with pytest.raises(GustformError, match=r"GF1015.*the sample period must be a parameter"):
-        with_events(lambda c: c.sampled(2 * c.T, {c.d: 1}))
+        with_events(lambda c: c.sample(2 * c.T, {c.d: 1}))
 
 
 def test_clauses_of_parts_carry_their_path() -> None:

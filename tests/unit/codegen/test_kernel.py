@@ -220,7 +220,7 @@ class OnlyEvents(Component):
 
     def equations(self) -> None:
         self.when(self.u > 1, {self.d: 1})
-        self.sampled(self.T, {self.d: self.u})
+        self.sample(self.T, {self.d: self.u})
 
 
 class Constrains(Component):

@@ -125,7 +125,7 @@ def state(statement: Callable[[Any], object]) -> Elaborated:
         ("GF1014", lambda c: c.when(c.x > 1, {c.x: 0}), "x cannot be set here: not a discrete"),
         ("GF1014", lambda c: c.when(c.x > 1, reinit={c.d: 0}), "d cannot be set here: not a variable"),
         ("GF1014", lambda c: c.when(c.x > 1, reinit={2 * c.x: 0}), "cannot be set here"),
-        ("GF1014", lambda c: c.sampled(c.T, {c.p: 0}), "p cannot be set here: not a discrete"),
+        ("GF1014", lambda c: c.sample(c.T, {c.p: 0}), "p cannot be set here: not a discrete"),
         ("GF1014", lambda c: c.when(c.x > 1, {"d": 0}), "d cannot be set here"),
         ("GF3001", lambda c: c.connect(c.pin, c.ac), "cannot connect pin (DcPort) to ac (AcPort)"),
         ("GF3001", lambda c: c.connect(c.pin, c.x), "a port to a signal"),
@@ -161,7 +161,7 @@ def test_when_and_sampled_are_collected() -> None:
             },
             reinit={c.x: 0, c.y: c.d},
         )
-        c.sampled(c.T, {c.d: c.d + 1})
+        c.sample(c.T, {c.d: c.d + 1})
 
     when, sampled = state(statements).whens
     assert [str(t) for t, _ in when.assign] == ["d"]

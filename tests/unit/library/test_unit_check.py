@@ -174,8 +174,8 @@ def test_the_message_has_file_line_and_text_of_the_equation() -> None:
         (lambda c: c.when(c.v > c.band, {c.d: c.i}), "'=' joins V and A"),
         (lambda c: c.when(c.v > c.band, reinit={c.v: c.x}), "'=' joins V and 1"),
         (lambda c: c.when(table2(c.cp, c.v, c.pitch) > 0.4, {c.d: c.v}), "the table's x"),
-        (lambda c: c.sampled(c.T, {c.d: c.x}), "'=' joins V and 1"),
-        (lambda c: c.sampled(c.n, {c.d: c.v}), "the sample period joins 1 and s"),
+        (lambda c: c.sample(c.T, {c.d: c.x}), "'=' joins V and 1"),
+        (lambda c: c.sample(c.n, {c.d: c.v}), "the sample period joins 1 and s"),
         (lambda c: c.initial(c.v, c.R), "'=' joins V and ohm"),
     ],
 )
@@ -189,7 +189,7 @@ def test_events_with_fitting_units_pass() -> None:
     def statements(c: Any) -> None:
         c.eq(c.T * c.der(c.v), c.band - c.v)
         c.when(ca.logic_or(c.v > c.band, ca.logic_not(c.x > 1)), {c.d: c.v + c.band}, reinit={c.v: 0})
-        c.sampled(c.T, {c.d: c.R * c.i})
+        c.sample(c.T, {c.d: c.R * c.i})
         c.initial(c.v, c.R * c.i)
 
     check(statements)
