@@ -47,10 +47,11 @@ demo: setup ## Set everything up and run the load-step scenario into ./demo
 	@$(BIN)/gustform simulate $(DEMO_SCENARIO) --out $(DEMO_OUT)
 
 .PHONY: test
-test: setup-dev ## All checks, C tests under sanitizers, then every Python test
+test: setup-dev ## All checks, C tests under sanitizers, every Python test, the tests on a CAN bus
 	@$(MAKE) lint
 	@$(MAKE) test-c
 	@$(MAKE) test-python
+	@$(MAKE) test-hil
 
 .PHONY: check
 check: setup-dev ## ruff, mypy --strict, the layers and clang-format: seconds, no tests
@@ -79,7 +80,13 @@ test-c: setup-dev ## C tests with AddressSanitizer and UBSan
 .PHONY: test-python
 test-python: setup-dev ## Python tests on all cores; ARGS=... goes to pytest
 	$(call say,Python tests)
-	@$(BIN)/python -m pytest -n auto $(ARGS)
+	@$(BIN)/python -m pytest -n auto --ignore=tests/hil/vcan $(ARGS)
+
+# The guest of the runner has one processor, so these tests run one after the other.
+.PHONY: test-hil
+test-hil: setup-dev ## Tests on a real vcan: this kernel's, else one in user-mode Linux; ARGS=... goes to pytest
+	$(call say,tests on a CAN bus)
+	@$(BIN)/python hil/vcan/with-vcan $(BIN)/python -m pytest -p no:cacheprovider tests/hil/vcan $(ARGS)
 
 .PHONY: bench
 bench: setup-dev ## Speed as ratios against a bare program and against CasADi
