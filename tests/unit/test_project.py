@@ -223,7 +223,7 @@ def test_the_wheel_holds_all_that_running_needs(tmp_path: Path) -> None:
     assert all(path.is_file() and path.is_relative_to(site) for path in paths)
     assert run(site / "gustform_runtime" / "bin" / "gust-run", "--help").returncode == 0
     assert list(site.glob("gustform_cli/scenarios/*.yaml"))
-    for pattern in ("can/*.dbc", "can/mapping_*.yaml", "bridge/include/gustform_bridge/*.h", "bridge/src/*.c", "pil/*.c"):
+    for pattern in ("can/*.dbc", "can/*.yaml", "bridge/include/gustform_bridge/*.h", "bridge/src/*.c", "pil/*.c"):
         shipped = [path.relative_to(ROOT / "hil") for path in (ROOT / "hil").glob(pattern)]
         assert shipped, pattern
         assert all((site / "gustform_hil" / path).is_file() for path in shipped), pattern
