@@ -40,7 +40,7 @@ def export_controller(
     report: bool,
 ) -> str:
     """Write the folder; returns what to print: with `report` the table of differences, the memory needed, the path."""
-    h = _period(period)
+    h = sample_period(period)
     if scenario is None:
         if overrides:
             raise GustformError("GF2070", "--set changes a scenario, and none is given", hint="NAME SCENARIO.yaml")
@@ -74,7 +74,8 @@ def _memory(made: Program, prefix: str, double: bool, out: Path) -> str:
     return as_text(found) + "".join(failed)
 
 
-def _period(text: str) -> float:
+def sample_period(text: str) -> float:
+    """Seconds of --period: s unless a unit is given. GF2070."""
     from gustform_cli.quantity import parse_quantity
 
     try:
@@ -104,9 +105,11 @@ def block_of_scenario(name: str, scenario: Path, overrides: Sequence[str]) -> Bl
     from gustform_cli.design import only_turbine
     from gustform_cli.model import link, load, placed, print_warnings
     from gustform_codegen.initial import steady_state
+    from gustform_codegen.sampled import continuous
 
     assembled = load(scenario, overrides)
     print_warnings(assembled)
+    assembled.system = continuous(assembled.system)
     found = only_turbine(assembled, scenario, name)
     linked = link(assembled).built.linked
     try:

@@ -19,6 +19,7 @@ from gustform_cli.versions import versions
 from gustform_codegen.initial import steady_state
 from gustform_codegen.linear import Limiter, Lineariser, LinearSystem
 from gustform_codegen.modes import NEUTRAL, REFERENCE, UNSTABLE, Mode, Modes, modes
+from gustform_codegen.sampled import continuous
 from gustform_codegen.table import Channel
 
 MATRICES, MODES, FIGURE = "linear.nc", "modes.json", "eigenvalues.png"
@@ -34,6 +35,7 @@ class Linearised:
     system: LinearSystem
     modes: Modes
     files: dict[str, Path]
+    sampled: list[str]  # units with a sampled control, which stands in the equations here
 
 
 def linearise(file: Path, out: Path, overrides: Sequence[str] = (), inputs: Sequence[str] = ()) -> Linearised:
@@ -43,6 +45,9 @@ def linearise(file: Path, out: Path, overrides: Sequence[str] = (), inputs: Sequ
     """
     prepare_folder(out)
     assembled = load(file, overrides)
+    before = assembled.system.components
+    assembled.system = continuous(assembled.system)
+    sampled = [name for name, unit in assembled.system.components.items() if unit is not before[name]]
     model = link(assembled)
     linked = model.built.linked
     try:
@@ -56,7 +61,7 @@ def linearise(file: Path, out: Path, overrides: Sequence[str] = (), inputs: Sequ
         raise placed(error, assembled) from None
     found = modes(system)
     files = {"matrices": out / MATRICES, "modes": out / MODES, "figure": out / FIGURE}
-    result = Linearised(assembled.scenario.name, system, found, files)
+    result = Linearised(assembled.scenario.name, system, found, files, sampled)
     _write_matrices(result, assembled.document.text())
     try:
         files["modes"].write_text(as_json(result) + "\n", encoding="utf-8")
@@ -146,7 +151,8 @@ def _number(value: complex) -> str:
 
 
 def warnings(result: Linearised) -> list[str]:
-    """What a reader of the eigenvalues must know: limiters at a bend or on a flat part, values that are held."""
+    """What a reader of the eigenvalues must know: limiters at a bend or on a flat part, values that are held,
+    controls that are sampled."""
     system = result.system
     lines = [
         f"{_who(one)}: at a bend of a limiter, mean of both slopes to {', '.join(one.unknowns)} taken in {one.text}"
@@ -159,6 +165,9 @@ def warnings(result: Linearised) -> list[str]:
     if system.held:
         more = f" and {len(system.held) - 6} more" if len(system.held) > 6 else ""
         lines.append(f"held, because only events or samples change them: {', '.join(system.held[:6])}{more}")
+    if result.sampled:
+        more = f" and {len(result.sampled) - 6} more" if len(result.sampled) > 6 else ""
+        lines.append(f"sampled controls, linearised as continuous ones: {', '.join(result.sampled[:6])}{more}")
     if result.modes.ill_conditioned:
         lines.append("eigenvectors nearly coincide: the participation factors of those modes mean little")
     return lines

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from gustform_cli.model import Model
 from gustform_cli.names import short_aliases
 from gustform_cli.result import Quantity, ResultWriter
 from gustform_cli.rows import RowBlocks, Rows, Times
+from gustform_cli.sampled import controller_warnings
 from gustform_cli.sampling import RowSampler, Sampler, WindowSampler, advance
 from gustform_cli.statistics import Plan, Report, as_dict, needs_starts, plan, report
 from gustform_cli.statistics_group import write_statistics
@@ -54,12 +55,24 @@ class Ended:
         return self.file
 
 
+class Attachment(Protocol):
+    """What takes part in a run from outside of it, as a controller on a bus does."""
+
+    def attach(self, simulation: Simulation) -> None:
+        """Before the simulation is initialised."""
+        ...
+
+    def stop(self) -> None:
+        """The run is to end; from any thread."""
+        ...
+
+
 class Run:
     """A run into `file`, or into none. A context; `execute` may work in any thread while others use `time` and
     `request_stop`.
 
     `table` starts in the steady state. `watchers` see every portion of the stored rows as well. With `resume` the run
-    goes on from there; its result is then the same as without the break, bit for bit.
+    goes on from there; its result is then the same as without the break, bit for bit. `attached` takes part in it.
     """
 
     def __init__(
@@ -69,6 +82,7 @@ class Run:
         file: Path | None,
         watchers: Sequence[Callable[[Times, Rows], None]] = (),
         resume: Checkpoint | None = None,
+        attached: Attachment | None = None,
     ) -> None:
         scenario = model.assembled.scenario
         self.model, self._table = model, table
@@ -90,6 +104,7 @@ class Run:
         self.most_rows = rows
         self.file = file
         self._watchers = watchers
+        self._attached = attached
         self._resume = resume
         self._resumed = False  # the rows before the break are in the result
         self._between = interval(self.until, scenario.run.checkpoint)
@@ -125,6 +140,8 @@ class Run:
         self._stop = True
         if self._simulation is not None:
             self._simulation.request_stop()
+        if self._attached is not None:
+            self._attached.stop()
 
     @property
     def table(self) -> SystemTable:
@@ -137,6 +154,7 @@ class Run:
 
         error, status = None, "completed"
         counters: dict[str, int | float] = {}
+        signalled: list[str] = []
         if needs_starts(self.model):
             self.plan = plan(self.model, self._starts())
         self._begin = time.perf_counter() - (self._resume.wall if self._resume is not None else 0.0)
@@ -148,6 +166,7 @@ class Run:
                 status = self._integrate(self._simulation, statistics)
             finally:
                 counters = self._simulation.statistics()
+                signalled = controller_warnings(self._simulation)
                 if statistics is not None:
                     self.statistics = report(self.plan, statistics)
         except GustformError as failure:
@@ -177,7 +196,11 @@ class Run:
             frequency=self.watch.summary(self.every) if self.watch is not None else None,
             events=self.events.summary(),
             trips=self.trips.times,
-            warnings=(*self.model.assembled.warnings, *(self._keeper.warnings if self._keeper is not None else ())),
+            warnings=(
+                *self.model.assembled.warnings,
+                *signalled,
+                *(self._keeper.warnings if self._keeper is not None else ()),
+            ),
             statistics=as_dict(self.statistics) if self.statistics is not None else {},
         )
         file = self._finish(writer, summary) if writer is not None else None
@@ -229,6 +252,8 @@ class Run:
             self._samplers.append(WindowSampler(self.events.windows, self.watched, self.events.add))
         if statistics is not None:
             simulation.set_statistics(statistics, self.plan.start)
+        if self._attached is not None:
+            self._attached.attach(simulation)
         simulation.initialise(0.0)
         number = 0
         if self._resume is not None:

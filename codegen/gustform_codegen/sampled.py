@@ -61,9 +61,7 @@ def continuous(system: System) -> System:
             )
     if all(made[id(component)] is component for component in system.components.values()):
         return system
-    return replace(
-        system, components={name: made[id(component)] for name, component in system.components.items()}, schedule=[]
-    )
+    return replace(system, components={name: made[id(component)] for name, component in system.components.items()})
 
 
 @dataclass(frozen=True, eq=False)

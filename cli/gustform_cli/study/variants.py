@@ -11,6 +11,7 @@ from gustform_cli.model import link, load
 from gustform_codegen.initial import steady_state
 from gustform_codegen.linear import Lineariser, LinearSystem
 from gustform_codegen.link import Linked
+from gustform_codegen.sampled import continuous
 from gustform_codegen.table import SystemTable, TypeTable
 
 Values = Mapping[str, float]  # by path in the component: "control.T_dc"
@@ -20,7 +21,9 @@ class Variants:
     """Linear systems of one scenario; what is computed from a changed parameter follows it, nothing is compiled."""
 
     def __init__(self, scenario: Path, overrides: Sequence[str] = ()) -> None:
-        self.linked = link(load(scenario, overrides)).built.linked
+        assembled = load(scenario, overrides)
+        assembled.system = continuous(assembled.system)
+        self.linked = link(assembled).built.linked
         self.table = steady_state(self.linked).table
         self._lineariser = Lineariser(self.linked, [], find_flats=False)
 
