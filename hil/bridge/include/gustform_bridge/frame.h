@@ -10,13 +10,12 @@ extern "C" {
 
 #define GUST_FRAME_DATA 64 /* bytes of the longest frame */
 
-enum gust_frame_flags {
-    GUST_FRAME_FD = 1U << 0,       /* CAN FD, always with bit-rate switch */
-    GUST_FRAME_EXTENDED = 1U << 1, /* 29-bit identifier */
-    GUST_FRAME_REMOTE = 1U << 2,   /* remote request: never part of the message set */
-    GUST_FRAME_ERROR = 1U << 3, /* error frame of the driver: `id` holds the class bits of linux/can/error.h */
-    GUST_FRAME_OWN = 1U << 4    /* echo of a frame that this transport has sent: it has left the queue */
-};
+/* Flags of a frame. */
+#define GUST_FRAME_FD       0x01U /* CAN FD, always with bit-rate switch */
+#define GUST_FRAME_EXTENDED 0x02U /* 29-bit identifier */
+#define GUST_FRAME_REMOTE   0x04U /* remote request: never part of the message set */
+#define GUST_FRAME_ERROR    0x08U /* of the driver: `id` holds the class bits of linux/can/error.h */
+#define GUST_FRAME_OWN      0x10U /* echo of a frame that this transport has sent: it has left */
 
 typedef struct gust_frame {
     uint64_t time; /* ns of the transport's clock, at reception */

@@ -35,7 +35,7 @@ struct gust_transport {
     gust_transport_status (*wait)(gust_transport *transport, uint64_t deadline);
     /* Frames handed over that have not left yet, as far as is known. */
     uint32_t (*pending)(gust_transport *transport);
-    /* Forget what has come in and, where that can be done, what has not left. */
+    /* Forget what has not left, where that can be done. */
     void (*flush)(gust_transport *transport);
     /* ns; CLOCK_MONOTONIC, or the virtual time of the loop. */
     uint64_t (*now)(gust_transport *transport);
