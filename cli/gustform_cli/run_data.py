@@ -30,9 +30,9 @@ class Curve:
 
 
 class RunData:
-    """An open result file; use as a context. GF7002 for a file that is none."""
+    """An open result file; use as a context. GF7002 for a file that is none. `every_row`: not thinned."""
 
-    def __init__(self, file: Path) -> None:
+    def __init__(self, file: Path, *, every_row: bool = False) -> None:
         import h5py
 
         self.path = file
@@ -49,7 +49,7 @@ class RunData:
             self._file.close()
             raise _not_a_result(file, f"it has {rows} rows")
         # Rows that two points stand for: their smallest and largest value, so that no peak is lost.
-        self._bin = 2 * -(-rows // _MOST_POINTS) if rows > _MOST_POINTS else 1
+        self._bin = 2 * -(-rows // _MOST_POINTS) if rows > _MOST_POINTS and not every_row else 1
         self.time = self._read(self._file["time"])
 
     def __enter__(self) -> RunData:

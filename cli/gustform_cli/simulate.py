@@ -18,7 +18,7 @@ from gustform_cli.interrupt import Interrupt
 from gustform_cli.model import link, load, placed, print_warnings
 from gustform_cli.progress import RunProgress
 from gustform_cli.result import RESULT, prepare_folder
-from gustform_cli.run import Ended, Run
+from gustform_cli.run import Attachment, Ended, Run
 from gustform_cli.summary import Summary, write_summary
 from gustform_codegen.initial import steady_state
 
@@ -37,10 +37,18 @@ class Outcome:
     error: GustformError | None  # why it failed, if it did
 
 
-def simulate(file: Path, out: Path, overrides: Sequence[str], interrupt: Interrupt, *, figure: bool = True) -> Outcome:
+def simulate(
+    file: Path,
+    out: Path,
+    overrides: Sequence[str],
+    interrupt: Interrupt,
+    *,
+    figure: bool = True,
+    attached: Attachment | None = None,
+) -> Outcome:
     """Run a scenario. Errors before the run are raised; what stops the run itself is in the outcome, with the
-    results so far written."""
-    return _simulate(lambda: load(file, overrides), out, interrupt, None, figure)
+    results so far written. `attached` takes part in the run."""
+    return _simulate(lambda: load(file, overrides), out, interrupt, None, figure, attached)
 
 
 def resume(folder: Path, interrupt: Interrupt, *, figure: bool = True) -> Outcome:
@@ -58,7 +66,12 @@ def resume(folder: Path, interrupt: Interrupt, *, figure: bool = True) -> Outcom
 
 
 def _simulate(
-    assembled_from: Callable[[], Assembled], out: Path, interrupt: Interrupt, found: Checkpoint | None, figure: bool
+    assembled_from: Callable[[], Assembled],
+    out: Path,
+    interrupt: Interrupt,
+    found: Checkpoint | None,
+    figure: bool,
+    attached: Attachment | None = None,
 ) -> Outcome:
     begin = time.perf_counter()
     assembled = assembled_from()
@@ -77,7 +90,7 @@ def _simulate(
         file=sys.stderr,
     )
     name = found.result if found is not None else RESULT
-    with Run(model, table, out / name, resume=found) as run:
+    with Run(model, table, out / name, resume=found, attached=attached) as run:
         ended = _watch(run, build_seconds, interrupt, found.time if found is not None else 0.0)
     summary_file = write_summary(ended.summary, out)
     drawn = out / FIGURE
