@@ -8,7 +8,7 @@
 
 #include "text.h"
 
-enum { LARGEST_CONTEXT = 1 << 20, MOST_SIGNALS = 1024 };
+enum { LARGEST_CONTEXT = 1000000, MOST_SIGNALS = 1024 };
 
 /* Every signal has a name and lies within the context. */
 static bool signals_fit(const gust_controller *controller, const gust_controller_signal *signals,

@@ -86,7 +86,7 @@ static void note_errors(gust_control *control, uint32_t errors, double t)
     }
     statistics->first_error = statistics->bad_samples == 0 ? t : statistics->first_error;
     ++statistics->bad_samples;
-    for (int bit = 0; bit < GUST_SAMPLED_ERRORS; ++bit) {
+    for (uint32_t bit = 0; bit < GUST_SAMPLED_ERRORS; ++bit) {
         statistics->errors[bit] += (errors >> bit) & 1U;
     }
 }

@@ -288,3 +288,46 @@ void builder_inline_series(system_builder *builder, int32_t interpolation, int32
     snprintf(name, sizeof name, "series.%d.unit", number);
     writer_text(&builder->writer, name, "m/s");
 }
+
+void builder_sampled(system_builder *builder, int32_t libraries, int32_t blocks, int32_t changes)
+{
+    const int32_t numbers[] = {libraries, blocks, changes};
+    writer_i32(&builder->writer, "sampled", numbers, 3);
+    if (libraries > 0) {
+        char path[512];
+        kernel_path("law", path, sizeof path);
+        writer_text(&builder->writer, "library.0.path", path);
+    }
+}
+
+static const char *of_block(int32_t number, const char *what)
+{
+    static char name[56];
+    snprintf(name, sizeof name, "sampled.%d.%s", number, what);
+    return name;
+}
+
+void builder_law(system_builder *builder, int32_t number, const int32_t kind[6], int32_t x, double period,
+                 const double numbers[3])
+{
+    model_writer *writer = &builder->writer;
+    const char *const measured[] = {"x", "double_x"};
+    const char *const units[] = {"V", "V"};
+    const char *const commanded[] = {"u"};
+    const char *const slopes[] = {"V/s"};
+    const built_type *type = &builder->types[kind[0]];
+    const int32_t measurement[] = {0, x, 1, 1, 0, 1};
+    const int32_t command[] = {1};
+    const size_t n = kind[2] == LIBRARY ? 1 : 0;
+    writer_text(writer, of_block(number, "name"), type->instances[kind[1]].name);
+    writer_i32(writer, of_block(number, "kind"), kind, 6);
+    writer_f64(writer, of_block(number, "period"), &period, 1);
+    writer_i32(writer, of_block(number, "measurement"), measurement, 6);
+    writer_i32(writer, of_block(number, "command"), command, 1);
+    writer_f64(writer, of_block(number, "parameters"), numbers, 2 * n);
+    writer_f64(writer, of_block(number, "states"), numbers + 2, n);
+    writer_texts(writer, of_block(number, "measurement_names"), measured, 2);
+    writer_texts(writer, of_block(number, "measurement_units"), units, 2);
+    writer_texts(writer, of_block(number, "command_names"), commanded, 1);
+    writer_texts(writer, of_block(number, "command_units"), slopes, 1);
+}

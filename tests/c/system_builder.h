@@ -62,6 +62,15 @@ void builder_link(system_builder *builder);
 /* Links, and loads the result; fails the test if it is refused. The caller destroys the model. */
 gust_model *builder_model(system_builder *builder);
 
+/* How many libraries (of law.c), sampled blocks and changes of their parameters there are. */
+enum { NONE = -1, LIBRARY = 0 };
+void builder_sampled(system_builder *builder, int32_t libraries, int32_t blocks, int32_t changes);
+
+/* Block `number`: the controller law.c at an instance of held.c whose unknown is number x. kind: see
+ * runtime/README.md; numbers: k, i, s. */
+void builder_law(system_builder *builder, int32_t number, const int32_t kind[6], int32_t x, double period,
+                 const double numbers[3]);
+
 /* Path of a test kernel library. */
 void kernel_path(const char *name, char *path, size_t size);
 

@@ -53,13 +53,14 @@ static int read_ramp(void *context, int64_t first, int64_t count, double *time, 
     return (int)count;
 }
 
-/* A circuit on a series that is read in blocks, a bouncing ball, a sampled loop, a change of a parameter. */
+/* A circuit on a series that is read in blocks, a bouncing ball, a sampled loop, a controller beside its plant,
+ * a change of a parameter. */
 static void run(void **state)
 {
     (void)state;
     static system_builder builder;
     memset(&builder, 0, sizeof builder);
-    builder.n_types = 3;
+    builder.n_types = 4;
     builder.types[0] = (built_type){.kernel = "rc",
                                     .n_instances = 1,
                                     .instances = {{.name = "circuit", .parameters = {2.0, 0.25}}},
@@ -79,6 +80,13 @@ static void run(void **state)
                      .differential = {1},
                      .when_root = {-1},
                      .when_period = {2}};
+    builder.types[3] = (built_type){.kernel = "held",
+                                    .n_instances = 1,
+                                    .instances = {{.name = "plant", .parameters = {1.0}, .start = {1.0}}},
+                                    .differential = {1}};
+    builder_sampled(&builder, 1, 1, 0);
+    builder_law(&builder, 0, (const int32_t[]){3, 0, LIBRARY, 1, 4, 28}, 5, 0.1,
+                (const double[]){2.0, 0.25, 0.0});
     builder.n_inputs = 1;
     builder.n_schedule = 1;
     builder.schedule_time[0] = 5.5;
@@ -109,7 +117,7 @@ static void run(void **state)
     initialise(sim, 0.0);
     const long before = allocations;
     assert_true(before > 0); /* the wrapping works */
-    double y[5], row[2];
+    double y[6], row[2];
     for (int k = 1; k <= 20; ++k) {
         advance(sim, (double)k);
         unknowns(sim, y);
@@ -126,6 +134,9 @@ static void run(void **state)
     gust_stats_cycles(stats, 0, NULL, NULL, NULL);
     assert_int_equal(allocations, before);
     assert_int_equal(moments.count, 2001);
+    gust_sampled_statistics sampled;
+    gust_sim_sampled_statistics(sim, 0, &sampled);
+    assert_int_equal(sampled.samples, 200); /* 0 ... 19.9 s */
     assert_true(statistics.restarts > 220);
     remove(GUSTFORM_TEST_KERNELS "/allocation.gustck");
     gust_sim_destroy(&sim);
