@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from gustform_cli.exits import FAILED, guarded
+from gustform_cli.hil.bench_app import COMMANDS
 
 hil = typer.Typer(
     name="hil",
@@ -98,3 +99,43 @@ def pil(
             write_text(out, boards.as_json(found))
         if not all(one.equal for one in found):
             raise typer.Exit(FAILED)
+
+
+@hil.command()
+def build(
+    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO.yaml", help="scenario file")],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="folder to write: new, empty, or a rig")],
+    turbine: Annotated[str | None, typer.Option(metavar="NAME", help="which turbine [the only one]")] = None,
+    bus: Annotated[Bus, typer.Option(help="which of the shipped databases")] = Bus.fd,
+    dbc: Annotated[Path | None, typer.Option(metavar="FILE", help="a database of your own instead")] = None,
+    mapping: Annotated[Path | None, typer.Option(metavar="FILE", help="what its messages mean")] = None,
+    period: Annotated[
+        str | None, typer.Option(metavar="TIME", help="sample period [the cycle time of the references]")
+    ] = None,
+    bitrate: Annotated[
+        str | None, typer.Option(metavar="RATE", help="that the messages must fit [500k with FD frames, else 1M]")
+    ] = None,
+    data_bitrate: Annotated[str, typer.Option(metavar="RATE", help="of the data of FD frames")] = "2M",
+    allow_overload: Annotated[
+        bool, typer.Option("--allow-overload", help="also where messages can miss their deadlines")
+    ] = False,
+    compile: Annotated[bool, typer.Option(help="compile the program as well")] = True,
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="PATH=VALUE", help="change one value of the scenario"),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Write a rig, the control of a turbine behind a CAN bus, as a folder that compiles anywhere; and compile it."""
+    with guarded():
+        from gustform_cli.hil import build as builder
+
+        options = builder.Options(
+            turbine, bus.value, dbc, mapping, period, bitrate, data_bitrate, allow_overload, compile, overrides or []
+        )
+        built = builder.build(scenario, out, options)
+        print(builder.as_json(built) if json else builder.as_text(built))
+
+
+for command in COMMANDS:
+    hil.command()(command)

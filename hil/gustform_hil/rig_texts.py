@@ -1,0 +1,82 @@
+"""CMakeLists.txt and README.md of a rig."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+
+def cmake(prefix: str, files: Sequence[str]) -> str:
+    """The one CMake file of a rig: controller in C99, everything else in C11. `prefix` is a name in C."""
+    common = [f for f in files if f.endswith(".c") and not f.startswith("bridge/tools/") and f != "bridge/src/main.c"]
+    listed = "\n".join(f"    {name}" for name in common)
+    return f"""# cmake -S . -B build && cmake --build build
+cmake_minimum_required(VERSION 3.16)
+project(gust_rig C)
+
+set(CMAKE_C_STANDARD_REQUIRED ON)
+set(CMAKE_C_EXTENSIONS OFF)
+if(NOT CMAKE_BUILD_TYPE)
+    set(CMAKE_BUILD_TYPE Release)
+endif()
+find_package(Threads REQUIRED)
+# No fused multiply-add: the same bits on every machine.
+add_compile_options(-ffp-contract=off)
+
+add_library(controller STATIC controller/{prefix}.c controller/{prefix}_interface.c)
+set_target_properties(controller PROPERTIES C_STANDARD 99)
+target_include_directories(controller PUBLIC controller)
+target_link_libraries(controller PUBLIC m)
+
+add_library(bridge STATIC
+{listed}
+)
+set_target_properties(bridge PROPERTIES C_STANDARD 11)
+target_include_directories(bridge PUBLIC bridge/include messages)
+target_compile_definitions(bridge PUBLIC _GNU_SOURCE)
+target_link_libraries(bridge PUBLIC controller Threads::Threads)
+
+add_executable(gust-bridge bridge/src/main.c)
+set_target_properties(gust-bridge PROPERTIES C_STANDARD 11)
+target_compile_definitions(gust-bridge PRIVATE GUST_BRIDGE_PREFIX={prefix})
+target_link_libraries(gust-bridge PRIVATE bridge)
+
+# Many frames through a bus, and what became of them.
+add_executable(gust-soak bridge/tools/soak.c)
+set_target_properties(gust-soak PROPERTIES C_STANDARD 11)
+target_link_libraries(gust-soak PRIVATE bridge)
+"""
+
+
+def readme(description: dict[str, Any]) -> str:
+    """What this rig is, and how it is compiled and run."""
+    d = description
+    return f"""# A rig: {d["control"]} on a CAN bus
+
+`gust-bridge` runs the control {d["control"]} of the turbine `{d["turbine"]}` in the scenario
+`{d["scenario"]}` every {d["period_s"] * 1e3:g} ms, behind the message set {d["messages"]} with the fingerprint
+{d["fingerprint"]}. `rig.json` says all of it, with the SHA-256 of each file; the controller has a README of
+its own.
+
+```sh
+cmake -S . -B build
+cmake --build build
+./build/gust-bridge --interface can0
+```
+
+It needs CMake 3.16, a C compiler and Linux with SocketCAN: no Python, no gustform. The folder `build` stays behind
+when the others are copied to another computer. The interface has to be up, and a bus that went off is not to come
+back by itself:
+
+```sh
+sudo ip link set can0 type can bitrate 500000 dbitrate 2000000 fd on restart-ms 0
+sudo ip link set can0 up
+```
+
+A classic bus has `bitrate 1000000` and neither `dbitrate` nor `fd`. `gustform hil budget` tells whether the messages
+fit. `--clock monotonic`, the default, keeps time itself; with `--clock sync` each Sync frame is one period.
+
+The bridge waits in INIT for the converter and in READY for the operator's start; any fault leads to SAFE, which only
+the operator's reset leaves. What SAFE guarantees and what it does not stands in `hil/README.md` of gustform.
+`build/gust-soak` sends many frames through a bus and counts what became of them.
+"""
