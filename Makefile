@@ -98,6 +98,13 @@ pil: setup-dev ## Exported controllers on emulated Cortex-M4F and M7: bits, inst
 	@$(BIN)/gustform hil pil --out build/pil.json $(ARGS)
 	@echo build/pil.json
 
+.PHONY: hil-realtime
+hil-realtime: setup-dev ## The bridge at 1 kHz in virtual time on an emulated PC, twice; needs Debian's apt
+	@tools/system_packages.sh --python $(PYTHON) --realtime
+	$(call say,the bridge at 1 kHz in virtual time (a minute or two))
+	@$(BIN)/python hil/realtime/realtime.py --json build/realtime.json $(ARGS)
+	@echo build/realtime.json
+
 .PHONY: docs
 docs: ## Build the documents into docs/_build/html
 	$(SET_UP) $(VENV_STAMPS)/docs
