@@ -1,0 +1,65 @@
+"""`gustform hil faults`: twelve faults into the bridge of a rig, as a table or as JSON."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, replace
+from pathlib import Path
+
+from gustform_cli.hil.rigs import rig_of
+from gustform_hil.bench import Bench
+from gustform_hil.bus import Bus
+from gustform_hil.client import Client
+from gustform_hil.codec import Codec
+from gustform_hil.faults import LIMIT_MS, Outcome, faults, inject, wrong_from_the_start
+from gustform_hil.process import Bridge
+from gustform_hil.rig_files import RigFiles
+
+
+@contextmanager
+def bench_of(rig: RigFiles, interface: str, clock: str = "sync") -> Iterator[Bench]:
+    """A bench with the rig's bridge, which ends with it."""
+    with Bus(interface, fd=rig.fd) as bus, Bridge(rig.bridge, interface, clock) as bridge:
+        yield Bench(Client(bus, Codec(rig.messages)), rig.measurements, rig.set_points, bridge.check)
+
+
+def run(interface: str, rig: Path | None, *, monotonic: bool = False) -> list[Outcome]:
+    """All of them, one after the other into the same bridge. `monotonic`: at the pace of this computer's clock; the
+    times are then wall times."""
+    with rig_of(rig) as found:
+        with bench_of(found, interface, "monotonic" if monotonic else "sync") as bench:
+            outcomes = [inject(bench, fault) for fault in faults(bench)]
+        if monotonic:
+            return [replace(one, to_safe_ms=one.wall_ms) for one in outcomes]
+        with bench_of(found, interface) as bench:
+            never = wrong_from_the_start(bench)
+    return [replace(o, violations=o.violations + never) if o.fault == "wrong_fingerprint" else o for o in outcomes]
+
+
+def good(outcomes: list[Outcome]) -> bool:
+    """Every one as specified."""
+    return all(one.good for one in outcomes)
+
+
+def as_json(outcomes: list[Outcome]) -> str:
+    """A list, one object for each fault."""
+    return json.dumps([{**asdict(one), "good": one.good} for one in outcomes], indent=2)
+
+
+def as_text(outcomes: list[Outcome], monotonic: bool = False) -> str:
+    """A table."""
+    lines = [f"{'fault':<20} {'detected':<9} {'to SAFE':>10} {'tolerated':<10} told by the bridge"]
+    for one in outcomes:
+        time = "" if one.to_safe_ms is None else f"{one.to_safe_ms:.3g} ms"
+        yes = {True: "yes", False: "no"}
+        lines.append(
+            f"{one.fault:<20} {yes[one.detected]:<9} {time:>10} {yes[one.tolerated]:<10} {', '.join(one.faults)}"
+        )
+        lines += [f"    {text}" for text in one.violations]
+    if monotonic:
+        lines.append("wall time, from the first frame of the fault to the arrival of blocked references; not judged")
+    else:
+        lines.append(f"bus time, from the Sync before the fault; at most {LIMIT_MS:g} ms")
+    return "\n".join(lines)
