@@ -38,7 +38,7 @@ say = @echo '== $(1)'
 help: ## List these targets
 	@printf 'make TARGET, where TARGET is one of\n\n'
 	@sed -nE 's/^([a-z][a-z-]*):.*## (.*)/\1\t\2/p' $(MAKEFILE_LIST) | while IFS=$$'\t' read -r name text; do \
-		printf '  %-12s %s\n' "$$name" "$$text"; done
+		printf '  %-14s %s\n' "$$name" "$$text"; done
 	@printf '\nSet up a fresh machine and see it run: make demo. Run every check: make test.\n'
 
 .PHONY: demo
