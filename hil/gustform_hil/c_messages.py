@@ -51,7 +51,7 @@ def _undated(text: str) -> str:
 
 
 def _check_names(messages: MessageSet) -> None:
-    """All names that the files will have, each once. A message set made elsewhere than in `database` is no exception."""
+    """All names that the files will have, each once; also of a set that `database` has not made."""
     names = [messages.name, *(m.name for m in messages.messages)]
     names += [s.name for m in messages.messages for s in m.signals]
     errors = [

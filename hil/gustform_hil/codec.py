@@ -60,6 +60,10 @@ class Codec:
         coder = self._coder(message)
         return {s.name: limited(s, coder.value(s, values)) for s in coder.active(values) if s.field not in E2E_FIELDS}
 
+    def protect(self, message: Message | str, data: bytearray, counter: int) -> None:
+        """Write counter and CRC into bytes that may say anything, as only a faulty sender would."""
+        self._coder(message).protector.protect(data, counter)
+
     def decode(
         self, identifier: int, data: bytes, *, fd: bool, extended: bool = False, remote: bool = False
     ) -> Decoded:

@@ -50,7 +50,8 @@ class Protector:
         if e2e.profile == 2:
             return bool(package.p02.e2e_p02_check(data, e2e.id_list))
         if e2e.profile == 1:
-            return data[1] & 0x0F < e2e.modulo and bool(package.p01.e2e_p01_check(data, e2e.data_id))
+            # This check of the package wants a buffer that it could write to.
+            return data[1] & 0x0F < e2e.modulo and bool(package.p01.e2e_p01_check(bytearray(data), e2e.data_id))
         return True
 
     def counter(self, data: bytes) -> int:

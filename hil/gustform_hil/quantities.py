@@ -7,12 +7,15 @@ from collections.abc import Mapping
 from gustform_codegen.emit.controller.ranges import INPUT_RANGES, OUTPUT_RANGES
 from gustform_hil.message_set import Field, Part
 
-_UNITS = {"dv_dc": "1/s", "wind": "m/s", "beta_del": "deg", "beta_ref": "deg"}
+_UNITS = {"dv_dc": "1/s", "wind": "m/s", "beta": "deg", "beta_del": "deg", "beta_ref": "deg"}
+
+# Also what only a controller with a schedule reads.
+_INPUTS = frozenset(INPUT_RANGES) | {"beta"}
 
 # Where quantities may stand. A set point may also be sent with the measurements, and the reverse.
 QUANTITIES: Mapping[Part, frozenset[str]] = {
-    Part.MEASUREMENTS: frozenset(INPUT_RANGES),
-    Part.SET_POINTS: frozenset(INPUT_RANGES),
+    Part.MEASUREMENTS: _INPUTS,
+    Part.SET_POINTS: _INPUTS,
     Part.REFERENCES: frozenset(OUTPUT_RANGES),
 }
 
