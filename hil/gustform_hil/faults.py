@@ -20,7 +20,7 @@ from gustform_hil.client import Command, Frame, State
 from gustform_hil.flood import Flood
 from gustform_hil.message_set import Part
 
-LIMIT_MS = 3.0  # of bus time, to SAFE
+LIMIT = 3  # periods of the bus, to SAFE: 3 ms at 1 kHz
 _PERIODS = 12  # a fault lasts, unless it says otherwise
 _AFTER = 30  # ordinary periods after it
 
@@ -48,6 +48,7 @@ class Outcome:
     to_safe_ms: float | None
     tolerated: bool
     wall_ms: float | None
+    periods: int | None  # of the bus
     expected: str
     faults: list[str]
     violations: list[str]
@@ -58,7 +59,7 @@ class Outcome:
             return False
         if self.expected == "tolerated":
             return self.tolerated
-        return self.to_safe_ms is not None and self.to_safe_ms <= LIMIT_MS and self.expected in self.faults
+        return self.periods is not None and self.periods <= LIMIT and self.expected in self.faults
 
 
 @dataclass
@@ -92,13 +93,14 @@ def inject(bench: Bench, fault: Fault) -> Outcome:
     names = fault_names(bench.client.heard.faults) if safe else []
     if safe:
         _stays(bench)
-    period_ms = bench.converter.period * 1e3
+    periods = None if watch.blocked is None else watch.blocked + 1
     outcome = Outcome(
         fault.name,
         rejected or safe,
-        None if watch.blocked is None else (watch.blocked + 1) * period_ms,
+        None if periods is None else periods * bench.converter.period * 1e3,
         watch.blocked is None and not safe,
         watch.wall_ms,
+        periods,
         fault.expected,
         names,
         bench.violations[before:],

@@ -86,7 +86,7 @@ def faults(
     ] = False,
     json: Json = False,
 ) -> None:
-    """Inject twelve faults into a running bridge; 1 if one neither leads to SAFE within 3 ms nor is tolerated."""
+    """Inject twelve faults into a running bridge; 1 if one neither leads to SAFE in 3 periods nor is tolerated."""
     with guarded():
         from gustform_cli.hil import faults as bench
 

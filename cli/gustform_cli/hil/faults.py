@@ -13,7 +13,7 @@ from gustform_hil.bench import Bench
 from gustform_hil.bus import Bus
 from gustform_hil.client import Client
 from gustform_hil.codec import Codec
-from gustform_hil.faults import LIMIT_MS, Outcome, faults, inject, wrong_from_the_start
+from gustform_hil.faults import LIMIT, Outcome, faults, inject, wrong_from_the_start
 from gustform_hil.process import Bridge
 from gustform_hil.rig_files import RigFiles
 
@@ -61,5 +61,5 @@ def as_text(outcomes: list[Outcome], monotonic: bool = False) -> str:
     if monotonic:
         lines.append("wall time, from the first frame of the fault to the arrival of blocked references; not judged")
     else:
-        lines.append(f"bus time, from the Sync before the fault; at most {LIMIT_MS:g} ms")
+        lines.append(f"bus time, from the Sync before the fault; at most {LIMIT} periods")
     return "\n".join(lines)

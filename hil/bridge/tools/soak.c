@@ -1,9 +1,9 @@
 /* gust-soak: many protected frames through one bus, and what became of them.
  *
  * A child process sends the measurements of the message set, each frame with the next sample number and
- * counter; this process receives, checks and decodes them with the layer that the bridge uses. A window of
- * frames may be on their way: the receiver answers each half of it with a References frame, because a socket's
- * buffer is finite and vcan, unlike a bus, takes frames faster than anyone reads them. One line of JSON on
+ * counter; this process receives, checks and decodes them with the layer that the bridge uses. A socket's
+ * buffer is finite, and vcan, unlike a bus, takes frames faster than anyone reads them: so a window of frames
+ * may be on their way, and the receiver tells beside the bus when half of it has come in. One line of JSON on
  * stdout. Exit: 0 all arrived in order and unharmed, 1 some did not, 2 usage or no bus.
  */
 #ifndef _GNU_SOURCE
@@ -12,9 +12,11 @@
 #include <errno.h>
 #include <inttypes.h>
 #include <math.h>
+#include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -22,17 +24,16 @@
 #include "gustform_bridge/socketcan.h"
 #include "gustform_bridge/transport.h"
 
-enum { WINDOW = 64, WARM = 2000, EXIT_USAGE = 2 };
-static const uint64_t PATIENCE = 2000000000U; /* ns without a frame: the rest is lost */
+enum { WINDOW = 128, WARM = 2000, EXIT_USAGE = 2, PATIENCE_MS = 2000 };
+static const uint64_t PATIENCE = PATIENCE_MS * UINT64_C(1000000); /* without a frame: the rest is lost */
 
 typedef struct stream {
-    const gust_message *data;   /* what is sent */
-    const gust_message *answer; /* what opens the window again */
-    int sample;                 /* number of its signal */
-    uint64_t samples;           /* that a sample number counts through */
+    const gust_message *data; /* what is sent */
+    int sample;               /* number of the signal that counts */
+    uint64_t samples;         /* how many numbers it has */
 } stream;
 
-/* What one side counts; the sender's goes through a pipe. */
+/* What one side counts. */
 typedef struct tally {
     uint64_t frames, lost, out_of_order, damaged;
     long memory_start, memory_end; /* kB */
@@ -57,8 +58,7 @@ static long memory_kb(void)
 static bool stream_of(const gust_message_set *set, stream *what)
 {
     what->data = gust_message_find(set, GUST_PART_MEASUREMENTS, 0);
-    what->answer = gust_message_find(set, GUST_PART_REFERENCES, 0);
-    if (what->data == NULL || what->answer == NULL) {
+    if (what->data == NULL) {
         return false;
     }
     what->sample = gust_message_signal(what->data, GUST_FIELD_SAMPLE, NULL);
@@ -80,24 +80,15 @@ static void fill(const stream *what, uint64_t number, double values[GUST_MESSAGE
     values[what->sample] = (double)(number % what->samples);
 }
 
-/* Until the answer that opens the window; false: it did not come. */
-static bool await_answer(gust_transport *bus, const stream *what)
+/* Until the receiver opens the window again; false: it does not. */
+static bool await_credit(int credits)
 {
-    const uint64_t deadline = bus->now(bus) + PATIENCE;
-    gust_frame frame;
-    for (;;) {
-        while (bus->receive(bus, &frame) == GUST_TRANSPORT_OK) {
-            if (frame.id == what->answer->id && (frame.flags & (GUST_FRAME_OWN | GUST_FRAME_ERROR)) == 0) {
-                return true;
-            }
-        }
-        if (bus->wait(bus, deadline) == GUST_TRANSPORT_EMPTY && bus->now(bus) >= deadline) {
-            return false;
-        }
-    }
+    struct pollfd end = {.fd = credits, .events = POLLIN};
+    char credit = 0;
+    return poll(&end, 1, PATIENCE_MS) == 1 && read(credits, &credit, 1) == 1;
 }
 
-static tally send_all(gust_transport *bus, const stream *what, uint64_t frames)
+static tally send_all(gust_transport *bus, const stream *what, uint64_t frames, int credits)
 {
     tally result = {0};
     double values[GUST_MESSAGE_SIGNALS];
@@ -108,7 +99,7 @@ static tally send_all(gust_transport *bus, const stream *what, uint64_t frames)
             result.memory_start = memory_kb();
         }
         if (open == 0) {
-            if (!await_answer(bus, what)) {
+            if (!await_credit(credits)) {
                 break;
             }
             open = WINDOW / 2;
@@ -162,19 +153,13 @@ static void judge(const stream *what, const gust_frame *frame, uint64_t *next, u
     *next += ahead + 1U;
 }
 
-static tally receive_all(gust_transport *bus, const stream *what, uint64_t frames)
+static tally receive_all(gust_transport *bus, const stream *what, uint64_t frames, int credits)
 {
     tally result = {0};
-    double values[GUST_MESSAGE_SIGNALS];
     gust_frame frame;
-    gust_frame answer;
     uint64_t next = 0;
     uint64_t begin = 0;
     uint8_t counter = 0;
-    uint8_t answers = 0;
-    for (int k = 0; k < what->answer->n_signals; k++) {
-        values[k] = what->answer->signals[k].safe;
-    }
     while (next < frames) {
         if (bus->receive(bus, &frame) != GUST_TRANSPORT_OK) {
             const uint64_t deadline = bus->now(bus) + PATIENCE;
@@ -192,8 +177,7 @@ static tally receive_all(gust_transport *bus, const stream *what, uint64_t frame
             result.memory_start = memory_kb();
         }
         if (result.frames % (WINDOW / 2) == 0) {
-            (void)gust_message_encode(what->answer, values, answers++, &answer);
-            (void)bus->send(bus, &answer);
+            (void)send(credits, "", 1, MSG_NOSIGNAL); /* a sender that has sent all may have ended */
         }
     }
     result.lost += frames - next;
@@ -202,18 +186,27 @@ static tally receive_all(gust_transport *bus, const stream *what, uint64_t frame
     return result;
 }
 
-/* The child: sends, tells through the pipe what it sent, and ends. */
-static int sender(const char *interface, const stream *what, uint64_t frames, int pipe_end)
+/* The child: sends, tells what it sent, and ends. */
+static int sender(const char *interface, const stream *what, uint64_t frames, int line)
 {
     gust_socketcan socketcan;
     gust_error error;
-    if (!gust_socketcan_open(&socketcan, interface, true, &error)) {
+    if (!gust_socketcan_open(&socketcan, interface, false, &error)) {
         return EXIT_USAGE;
     }
-    gust_transport *const bus = &socketcan.transport;
-    const tally sent = send_all(bus, what, frames);
-    bus->close(bus);
-    return write(pipe_end, &sent, sizeof sent) == (ssize_t)sizeof sent ? EXIT_SUCCESS : EXIT_FAILURE;
+    const tally sent = send_all(&socketcan.transport, what, frames, line);
+    socketcan.transport.close(&socketcan.transport);
+    return write(line, &sent, sizeof sent) == (ssize_t)sizeof sent ? EXIT_SUCCESS : EXIT_FAILURE;
+}
+
+/* This process: receives, and hears from the child what was sent. */
+static tally receiver(gust_transport *bus, const stream *what, uint64_t frames, int line, tally *sent)
+{
+    const tally received = receive_all(bus, what, frames, line);
+    if (read(line, sent, sizeof *sent) != (ssize_t)sizeof *sent) {
+        (void)fprintf(stderr, "gust-soak: the sender did not come to its end\n");
+    }
+    return received;
 }
 
 static int soak(const char *interface, uint64_t frames)
@@ -221,8 +214,7 @@ static int soak(const char *interface, uint64_t frames)
     stream what;
     int ends[2];
     if (!stream_of(&gust_messages, &what)) {
-        (void)fprintf(stderr,
-                      "gust-soak: the database has no measurements with a sample number, or no references\n");
+        (void)fprintf(stderr, "gust-soak: the database has no measurements with a sample number\n");
         return EXIT_USAGE;
     }
     gust_socketcan socketcan;
@@ -232,7 +224,9 @@ static int soak(const char *interface, uint64_t frames)
         return EXIT_USAGE;
     }
     gust_transport *const bus = &socketcan.transport;
-    if (pipe(ends) != 0) {
+    tally sent = {0};
+    tally received = {0};
+    if (socketpair(AF_UNIX, SOCK_STREAM, 0, ends) != 0) {
         bus->close(bus);
         return EXIT_FAILURE;
     }
@@ -243,13 +237,8 @@ static int soak(const char *interface, uint64_t frames)
         _exit(sender(interface, &what, frames, ends[1]));
     }
     (void)close(ends[1]);
-    tally sent = {0};
-    tally received = {0};
     if (child > 0) {
-        received = receive_all(bus, &what, frames);
-        if (read(ends[0], &sent, sizeof sent) != (ssize_t)sizeof sent) {
-            (void)fprintf(stderr, "gust-soak: the sender did not come to its end\n");
-        }
+        received = receiver(bus, &what, frames, ends[0], &sent);
         (void)waitpid(child, NULL, 0);
     }
     (void)close(ends[0]);
