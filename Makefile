@@ -21,9 +21,9 @@ PLACE := $(shell printf '%s' '$(CURDIR)' | cksum | cut -d' ' -f1)
 VENV_STAMPS := $(VENV)/.stamps-$(PLACE)
 BUILD_STAMPS := build/.stamps-$(PLACE)
 
-C_CONFIGURATION := CMakeLists.txt $(shell find runtime tests/c -name CMakeLists.txt -o -name '*.cmake' 2>/dev/null)
+C_CONFIGURATION := CMakeLists.txt $(shell find runtime tests/c hil/bridge -name CMakeLists.txt -o -name '*.cmake' 2>/dev/null)
 RUNTIME_SOURCES := $(shell find runtime/include runtime/src -type f 2>/dev/null)
-TEST_SOURCES := $(shell find tests/c -type f 2>/dev/null)
+TEST_SOURCES := $(shell find tests/c hil/bridge -type f 2>/dev/null)
 
 PIP_INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-input --constraint tools/constraints.txt
 # Set-up runs in a make of its own under a lock, so that two makes in one work tree do not both build it.

@@ -142,6 +142,10 @@ gust_transport_status gust_link_send(gust_link *link, const gust_message *messag
     if (*cut != 0) {
         ++link->counts.cut;
     }
+    if (frame.length == 0) {
+        ++link->counts.not_sent; /* an unknown multiplexer: nothing that could be sent */
+        return GUST_TRANSPORT_OK;
+    }
     const gust_transport_status status = link->transport->send(link->transport, &frame);
     if (status != GUST_TRANSPORT_OK) {
         ++link->counts.not_sent;

@@ -33,7 +33,6 @@ void gust_supervision_raise(gust_supervision *s, uint32_t faults)
     if (faults == 0) {
         return;
     }
-    s->recent |= faults;
     s->silent = 0;
     uint32_t leading = s->state == GUST_STATE_INIT ? faults & ~GUST_FAULTS_WAITING : faults;
     if (leading != 0) {
@@ -105,6 +104,12 @@ void gust_supervision_converter(gust_supervision *s, uint32_t state)
     }
 }
 
+/* Nothing that persists: it would have been raised again. */
+static bool quiet(const gust_supervision *s)
+{
+    return s->silent > s->limits.quiet;
+}
+
 gust_answer gust_supervision_command(gust_supervision *s, gust_command command, uint32_t nonce)
 {
     if (s->commanded && nonce == s->nonce) {
@@ -122,7 +127,7 @@ gust_answer gust_supervision_command(gust_supervision *s, gust_command command, 
         s->state = GUST_STATE_READY;
         return GUST_ANSWER_DONE;
     }
-    if (command == GUST_COMMAND_RESET && s->state == GUST_STATE_SAFE && s->recent == 0) {
+    if (command == GUST_COMMAND_RESET && s->state == GUST_STATE_SAFE && quiet(s)) {
         s->state = GUST_STATE_INIT;
         s->faults = 0;
         s->measured = false;
@@ -205,9 +210,6 @@ static uint32_t count_silence(gust_supervision *s, const gust_period *period)
 void gust_supervision_tick(gust_supervision *s, const gust_period *period)
 {
     ++s->silent;
-    if (s->silent > s->limits.quiet) {
-        s->recent = 0;
-    }
     uint32_t faults = 0;
     if (period->periods > s->limits.deadlines + 1U) {
         faults |= (uint32_t)GUST_FAULT_DEADLINE;
@@ -217,7 +219,7 @@ void gust_supervision_tick(gust_supervision *s, const gust_period *period)
     faults |= count_silence(s, period);
     gust_supervision_raise(s, faults);
     bool known = s->known || !s->limits.fingerprint;
-    if (s->state == GUST_STATE_INIT && s->fresh && s->recent == 0 && known) {
+    if (s->state == GUST_STATE_INIT && s->fresh && quiet(s) && known) {
         s->state = GUST_STATE_READY;
     }
 }

@@ -82,10 +82,9 @@ typedef struct gust_supervision {
     gust_limits limits;
     gust_state state;
     uint32_t faults;  /* that led to SAFE, or came after; 0 in the other states */
-    uint32_t recent;  /* raised within the last `quiet` periods */
     bool fresh;       /* this period's sample is to be acted on */
     uint32_t elapsed; /* periods from the fresh sample before it */
-    uint32_t silent;  /* periods since a fault was raised */
+    uint32_t silent;  /* periods since a fault was raised, or since the start */
     uint32_t missing; /* periods without a fresh sample */
     uint32_t unsynced;
     uint32_t causes;  /* why those samples were not fresh */
