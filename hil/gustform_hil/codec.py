@@ -169,7 +169,7 @@ class _Coder:
         checked = [s for s in self._signals[key] if s.field not in E2E_FIELDS]
         if not all(math.isfinite(found[s.name]) for s in checked):
             return Decoded(message, Problem.NOT_FINITE, counter=counter)
-        if not all(s.low <= found[s.name] <= s.high for s in checked if s is not self.multiplexer):
+        if not all(s.low <= found[s.name] <= s.high for s in checked):
             return Decoded(message, Problem.OUT_OF_RANGE, counter=counter)
         return Decoded(message, None, {name: float(value) for name, value in found.items()}, counter)
 
