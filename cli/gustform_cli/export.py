@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from gustform.control.converter_control import ConverterControl
+from gustform.control.curtailment_schedule import CurtailmentSchedule
 from gustform.language.component import suggest
 from gustform.language.errors import GustformError
 from gustform.registry import PARTS
@@ -38,6 +39,7 @@ def export_controller(
     method: str,
     overrides: Sequence[str],
     report: bool,
+    schedule: bool = True,
 ) -> str:
     """Write the folder; returns what to print: with `report` the table of differences, the memory needed, the path."""
     h = sample_period(period)
@@ -46,7 +48,7 @@ def export_controller(
             raise GustformError("GF2070", "--set changes a scenario, and none is given", hint="NAME SCENARIO.yaml")
         block = default_block(name)
     else:
-        block = block_of_scenario(name, scenario, overrides)
+        block = block_of_scenario(name, scenario, overrides, schedule=schedule)
     made = program(discretise(block, h, Method(method)))
     known_as = default_prefix(block.name) if prefix is None else prefix
     write_folder(made, known_as, double, out)
@@ -100,8 +102,11 @@ def default_block(name: str) -> Block:
     return controller_block(turbine.control, turbine.pitch)
 
 
-def block_of_scenario(name: str, scenario: Path, overrides: Sequence[str]) -> Block:
-    """The control of a turbine of a scenario, with the set points and states of its steady state. GF2047."""
+def block_of_scenario(name: str, scenario: Path, overrides: Sequence[str], *, schedule: bool = True) -> Block:
+    """The control of a turbine of a scenario, with the set points and states of its steady state. GF2047.
+
+    Where its operating point comes from a CurtailmentSchedule, that is part of it; without `schedule`, an input.
+    """
     from gustform_cli.design import only_turbine
     from gustform_cli.model import link, load, placed, print_warnings
     from gustform_codegen.initial import steady_state
@@ -126,7 +131,9 @@ def block_of_scenario(name: str, scenario: Path, overrides: Sequence[str]) -> Bl
             values |= at
             values |= {alias: sign * at[path] for alias, (path, sign) in t.unit.aliases.items() if path in at}
     rounded = {key: _rounded(v) for key, v in values.items()}
-    return controller_block(found.component.control, found.component.pitch, rounded)
+    turbine = found.component
+    part = turbine.schedule if schedule and isinstance(turbine.schedule, CurtailmentSchedule) else None
+    return controller_block(turbine.control, turbine.pitch, rounded, part)
 
 
 def _rounded(value: float) -> float:

@@ -53,6 +53,9 @@ def controller(
         list[str] | None,
         typer.Option("--set", metavar="PATH=VALUE", help="change one value of the scenario, e.g. wt.K_gsc=0.4"),
     ] = None,
+    schedule: Annotated[
+        bool, typer.Option("--schedule/--no-schedule", help="with the scenario's curtailment schedule, or its result")
+    ] = True,
     report: Annotated[
         bool, typer.Option("--report", help="compare with the continuous frequency response; adds frequency.csv")
     ] = False,
@@ -72,5 +75,6 @@ def controller(
                 method=method.value,
                 overrides=overrides or [],
                 report=report,
+                schedule=schedule,
             )
         )

@@ -30,6 +30,13 @@ class Substitution:
         self.values.append(value)
         self.known.add(key_of(symbol))
 
+    def and_also(self, symbol: Any, value: Any) -> Substitution:
+        """A copy with one more."""
+        result = Substitution()
+        result.symbols, result.values = [*self.symbols, symbol], [*self.values, value]
+        result.known = self.known | {key_of(symbol)}
+        return result
+
     def apply(self, expressions: list[Any]) -> list[Any]:
         if not self.symbols or not expressions:
             return expressions

@@ -52,7 +52,7 @@ class Records:
         exact = (self.ticks.astype(np.float64) - nothing) * 1000.0 / (thousand - nothing) + 1.0
         whole = np.rint(exact)
         if np.max(np.abs(exact - whole)) > 0.25:
-            raise GustformError("GF4106", "the emulator's timer does not count instructions", hint=f"{QEMU} 7 or newer")
+            raise GustformError("GF4111", "the emulator's timer does not count instructions", hint=f"{QEMU} 7 or newer")
         return whole.astype(np.int64)
 
 
@@ -81,18 +81,18 @@ class Measured:
 
 
 def require() -> None:
-    """GF4105 if a program that is needed is missing."""
+    """GF4110 if a program that is needed is missing."""
     for program, package in ((QEMU, "qemu-system-arm"), (f"{CROSS}gcc", "gcc-arm-none-eabi libnewlib-arm-none-eabi")):
         if which(program) is None:
             raise GustformError(
-                "GF4105",
+                "GF4110",
                 f"{program} is not installed",
                 hint=f"sudo apt-get install --no-install-recommends {package}",
             )
 
 
 def processor_in_the_loop(program: Program, prefix: str, inputs: Array, boards: list[str]) -> list[Measured]:
-    """Run a controller over samples, in float and in double, on each board. GF4105, GF4106."""
+    """Run a controller over samples, in float and in double, on each board. GF4110, GF4111."""
     require()
     found = []
     with tempfile.TemporaryDirectory(prefix="gustform-pil-") as scratch:
@@ -186,7 +186,7 @@ def _read(file: Path) -> Records:
     width = 4 + summary["context_size"]
     body = data[: -4 * len(_SUMMARY)]
     if summary["samples"] == 0 or len(body) != width * summary["samples"]:
-        raise GustformError("GF4106", "the harness did not write a record for each sample", hint="report this")
+        raise GustformError("GF4111", "the harness did not write a record for each sample", hint="report this")
     rows = np.frombuffer(body, np.uint8).reshape(-1, width)
     return Records(rows[:, 4:].copy(), rows[:, :4].copy().view("<u4").ravel(), summary)
 
@@ -204,8 +204,8 @@ def _run(command: list[str], folder: Path | None = None) -> str:
             stdin=subprocess.DEVNULL,
         )
     except (OSError, subprocess.TimeoutExpired) as failure:
-        raise GustformError("GF4106", f"{name} could not be run: {failure}", hint="see docs/export.md") from None
+        raise GustformError("GF4111", f"{name} could not be run: {failure}", hint="see docs/export.md") from None
     if done.returncode != 0:
         words = (done.stderr or f"exit status {done.returncode}").strip().splitlines()
-        raise GustformError("GF4106", f"{name} failed: {' | '.join(words[:3])}", hint="see docs/export.md")
+        raise GustformError("GF4111", f"{name} failed: {' | '.join(words[:3])}", hint="see docs/export.md")
     return done.stdout

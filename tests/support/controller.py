@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gustform.control.converter_control import ConverterControl
+from gustform.control.curtailment_schedule import CurtailmentSchedule
 from gustform.registry import PARTS
 from gustform.turbines.pmsg_turbine import PmsgTurbine
 from gustform_codegen.emit.controller.block import Block, controller_block
@@ -20,6 +21,8 @@ from gustform_codegen.toolchain import find_compiler
 
 DRIVER = Path(__file__).with_name("controller_driver.c")
 CONTROLS = ["DualPort", "Droop", "GridFollowing", "Matching", "VirtualSynchronousMachine"]
+# With a curtailment schedule: the wind measured, or observed, which has a state more and looks up a slope.
+SCHEDULED = ["DualPort+measured", "GridFollowing+estimated"]
 PREFIX = "ctl"
 PERIOD = 1e-3
 
@@ -28,13 +31,20 @@ Bits = NDArray[np.uint32]
 
 
 def block_of(control: str | ConverterControl) -> Block:
-    """A control by its name or as it is, with the pitch control of the default turbine."""
+    """A control by its name or as it is, with the pitch control of the default turbine.
+
+    "DualPort+measured": with a schedule whose wind is measured.
+    """
+    turbine, schedule = PmsgTurbine(), None
     if isinstance(control, str):
-        kind = PARTS[control].kind
+        name, _, source = control.partition("+")
+        kind = PARTS[name].kind
         assert issubclass(kind, ConverterControl)
         control = kind()
-    turbine = PmsgTurbine()
-    return controller_block(control, turbine.pitch)
+        if source:
+            turbine = PmsgTurbine(schedule=CurtailmentSchedule(wind_source=source))
+            schedule = turbine.schedule
+    return controller_block(control, turbine.pitch, None, schedule)
 
 
 def program_of(control: str | ConverterControl, method: Method = Method.tustin, period: float = PERIOD) -> Program:

@@ -77,6 +77,29 @@ def test_a_turbine_of_a_scenario_begins_in_its_steady_state(tmp_path: Path) -> N
     assert state["gsc_xi"] == 0.0
 
 
+def test_a_curtailment_schedule_is_exported_with_its_tables(tmp_path: Path) -> None:
+    chosen = ["--set", "components.wt.schedule={type: CurtailmentSchedule}"]
+    done = export("wt", str(LOAD_STEP), "--out", "rig", *chosen, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    found = json.loads((tmp_path / "rig" / "dual_port.json").read_text())
+    inputs = {s["name"] for s in found["inputs"]}
+    assert "wind" in inputs
+    assert inputs.isdisjoint({"omega_del", "beta_del"})
+    assert {s["name"]: s["start"] for s in found["states"]}["schedule_v"] == 8.0
+    assert {p["name"]: p["default"] for p in found["parameters"]}["schedule_curtailment"] == 0.1
+    tables = {t["name"]: t for t in found["tables"]}
+    assert set(tables) == {"schedule_omega_table", "schedule_beta_table"}
+    assert tables["schedule_omega_table"]["x"] == [3.0, 25.0]  # cut-in to cut-out
+    assert "schedule_omega_table" in (tmp_path / "rig" / "README.md").read_text()
+    memory = json.loads((tmp_path / "rig" / "footprint.json").read_text())
+    assert all((m["data"], m["bss"]) == (0, 0) for m in memory)
+    done = export("wt", str(LOAD_STEP), "--out", "bare", "--no-schedule", *chosen, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    found = json.loads((tmp_path / "bare" / "dual_port.json").read_text())
+    assert {"omega_del", "beta_del"} <= {s["name"] for s in found["inputs"]}
+    assert found["tables"] == []
+
+
 @pytest.mark.parametrize(
     ("arguments", "code"),
     [

@@ -28,9 +28,20 @@ FAR = 1e-5
 NEAR, OVER = 1e-3, 0.25
 
 
-@pytest.mark.parametrize("control", CONTROLS)
-def test_commands_are_those_of_the_continuous_control(control: str, tmp_path: Path) -> None:
+SCHEDULES = {
+    "": "",
+    "measured": "{type: CurtailmentSchedule}",
+    "estimated": "{type: CurtailmentSchedule, wind_source: estimated}",
+}
+
+
+@pytest.mark.parametrize(
+    ("control", "schedule"), [*((c, "") for c in CONTROLS), ("DualPort", "measured"), ("DualPort", "estimated")]
+)
+def test_commands_are_those_of_the_continuous_control(control: str, schedule: str, tmp_path: Path) -> None:
     chosen = [f"components.wt.control={{type: {control}}}"]
+    if schedule:
+        chosen.append(f"components.wt.schedule={SCHEDULES[schedule]}")
     block = block_of_scenario("wt", LOAD_STEP, chosen)
     # What a part reads is a channel under the name of what it reads.
     at = {"omega_del": "wt.schedule.omega_del", "beta_del": "wt.schedule.beta_del"}
@@ -55,5 +66,6 @@ def test_commands_are_those_of_the_continuous_control(control: str, tmp_path: Pa
     near = (time > STEP - 0.002) & (time < STEP + OVER)
     assert float(difference[~near].max()) < AWAY.get(control, FAR)
     assert float(difference[near].max()) < NEAR
+    assert (schedule != "") == ("omega_del" not in [s.name for s in block.inputs])
     moved = np.ptp(expected[time > STEP - 0.1], axis=0) / nominal
     assert moved.max() > 100 * FAR  # there is something to follow

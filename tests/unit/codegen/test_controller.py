@@ -6,21 +6,24 @@ import ctypes
 import json
 import re
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from gustform.language.errors import GustformError
+from gustform.language.table import TableData
 from gustform_codegen.emit.controller.c_files import ERRORS
 from gustform_codegen.emit.controller.description import stable_id
 from gustform_codegen.emit.controller.discretise import Method
 from gustform_codegen.emit.controller.folder import WARNINGS, default_prefix, files, write_folder
-from gustform_codegen.emit.controller.program import Evaluator
+from gustform_codegen.emit.controller.program import Evaluator, Program
 from gustform_codegen.emit.controller.vectors import input_sequence
 from gustform_codegen.toolchain import find_compiler
-from tests.support.controller import CONTROLS, PREFIX, Array, Compiled, program_of
+from tests.support.controller import CONTROLS, PREFIX, SCHEDULED, Array, Compiled, program_of
 
+EVERY = [*CONTROLS, *SCHEDULED]
 BIT = {name: 1 << k for k, (name, _) in enumerate(ERRORS)}
 
 
@@ -29,7 +32,7 @@ def compiled(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, bool],
     """Every control in float and in double."""
     return {
         (name, double): Compiled(program_of(name), tmp_path_factory.mktemp(f"{name}_{double}"), double)
-        for name in CONTROLS
+        for name in EVERY
         for double in (False, True)
     }
 
@@ -42,7 +45,7 @@ def by_casadi(one: Compiled, inputs: Array) -> tuple[Array, Array]:
 
 
 # ---- numbers --------------------------------------------------------------------------------------------------------
-@pytest.mark.parametrize("name", CONTROLS)
+@pytest.mark.parametrize("name", EVERY)
 def test_double_has_the_bits_of_casadi(name: str, compiled: dict[tuple[str, bool], Compiled]) -> None:
     one = compiled[name, True]
     inputs = input_sequence(one.program, 2000, seed=1)
@@ -50,10 +53,10 @@ def test_double_has_the_bits_of_casadi(name: str, compiled: dict[tuple[str, bool
     expected_out, expected_memory = by_casadi(one, inputs)
     np.testing.assert_array_equal(out, expected_out)
     np.testing.assert_array_equal(memory, expected_memory)
-    assert not np.any(errors & ~np.uint32(BIT["OUTPUT_LIMITED"]))
+    assert not np.any(errors & ~np.uint32(BIT["OUTPUT_LIMITED"] | BIT["TABLE_RANGE"]))
 
 
-@pytest.mark.parametrize("name", CONTROLS)
+@pytest.mark.parametrize("name", EVERY)
 def test_float_follows_within_its_digits(name: str, compiled: dict[tuple[str, bool], Compiled]) -> None:
     one = compiled[name, False]
     inputs = input_sequence(one.program, 20_000, seed=2)
@@ -71,13 +74,13 @@ def test_other_methods_have_the_bits_of_casadi(method: Method, tmp_path: Path) -
     np.testing.assert_array_equal(one.run(inputs)[0], by_casadi(one, inputs)[0])
 
 
-@pytest.mark.parametrize("name", CONTROLS)
+@pytest.mark.parametrize("name", EVERY)
 def test_context_is_small(name: str, compiled: dict[tuple[str, bool], Compiled]) -> None:
     assert compiled[name, False].library.context_size() <= 512  # bytes, issue 5
 
 
 # ---- bad samples ----------------------------------------------------------------------------------------------------
-@pytest.mark.parametrize("name", CONTROLS)
+@pytest.mark.parametrize("name", EVERY)
 @pytest.mark.parametrize("double", [False, True])
 def test_a_bad_sample_of_any_input_is_as_if_it_had_not_been(
     name: str, double: bool, compiled: dict[tuple[str, bool], Compiled]
@@ -96,27 +99,32 @@ def test_a_bad_sample_of_any_input_is_as_if_it_had_not_been(
             np.testing.assert_array_equal(memory[30], reference_memory[29])
             assert errors[30] == BIT["INPUT_RANGE" if np.isfinite(value) else "INPUT_NOT_FINITE"]
             np.testing.assert_array_equal(np.delete(out, 30, axis=0), reference)
-            assert int(errors[31]) in (0, BIT["OUTPUT_LIMITED"])
+            assert not int(errors[31]) & ~(BIT["OUTPUT_LIMITED"] | BIT["TABLE_RANGE"])
 
 
-@pytest.mark.parametrize("name", CONTROLS)
+@pytest.mark.parametrize("name", EVERY)
 def test_a_denormal_is_a_number_like_others(name: str, compiled: dict[tuple[str, bool], Compiled]) -> None:
     one = compiled[name, False]
     block = one.program.step.block
     low, high = (np.array([getattr(s, end) for s in block.outputs]) for end in ("low", "high"))
-    for k in range(len(block.inputs)):
+    for k, signal in enumerate(block.inputs):
         inputs = input_sequence(one.program, 40, seed=5)
         zero = inputs.copy()
         inputs[20, k], zero[20, k] = 1e-40, 0.0
         out, _, errors = one.run(inputs)
         assert np.all((out >= low) & (out <= high))
+        if signal.name == "omega_r" and "estimated" in name:  # the observer divides by it
+            assert errors[20] & BIT["NUMERIC"]
+            np.testing.assert_array_equal(out[20], out[19])
+            np.testing.assert_array_equal(np.delete(out, 20, axis=0), one.run(np.delete(inputs, 20, axis=0))[0])
+            continue
         assert not np.any(errors & (BIT["INPUT_NOT_FINITE"] | BIT["INPUT_RANGE"] | BIT["NUMERIC"]))
         # It may come through as it is, below the smallest normal number, 1.2e-38.
         np.testing.assert_allclose(out, one.run(zero)[0], rtol=0.0, atol=1e-38)
 
 
 # ---- random samples -------------------------------------------------------------------------------------------------
-@pytest.mark.parametrize("name", CONTROLS)
+@pytest.mark.parametrize("name", EVERY)
 def test_limits_hold_over_random_samples(name: str, compiled: dict[tuple[str, bool], Compiled]) -> None:
     one = compiled[name, False]
     step = one.program.step
@@ -140,7 +148,7 @@ def test_limits_hold_over_random_samples(name: str, compiled: dict[tuple[str, bo
     assert 0.85 * n < accepted.sum() < n
     held = np.flatnonzero(~accepted[1:]) + 1
     np.testing.assert_array_equal(out[held], out[held - 1])
-    if name == "GridFollowing":
+    if name.startswith("GridFollowing"):
         i = [s.name for s in block.outputs]
         current = np.hypot(out[:, i.index("i_d_gsc")], out[:, i.index("i_q_gsc")])
         assert current.max() <= value["i_max"] * (1.0 + 1e-6)  # float
@@ -198,11 +206,11 @@ def test_recalibrate_takes_all_parameters_or_none(compiled: dict[tuple[str, bool
 
 
 # ---- the folder -----------------------------------------------------------------------------------------------------
-@pytest.mark.parametrize("name", CONTROLS)
+@pytest.mark.parametrize("name", EVERY)
 @pytest.mark.parametrize("language", ["c", "c++"])
 def test_no_warning_in_c_or_cpp_and_the_folder_tests_itself(name: str, language: str, tmp_path: Path) -> None:
     made = program_of(name)
-    prefix = default_prefix(name)
+    prefix = default_prefix(name.partition("+")[0])
     write_folder(made, prefix, False, tmp_path)
     strict = ["-std=c99", "-Wmissing-prototypes", "-Wstrict-prototypes"] if language == "c" else ["-std=c++11"]
     compiler = find_compiler().path if language == "c" else "c++"
@@ -220,10 +228,20 @@ def test_no_warning_in_c_or_cpp_and_the_folder_tests_itself(name: str, language:
         assert ran.returncode == 0, ran.stdout
 
 
-@pytest.mark.parametrize("name", CONTROLS)
+def with_small_tables(made: Program) -> Program:
+    """cppcheck takes half a minute over tables of full size."""
+    block = made.step.block
+    x, y = np.linspace(0.0, 1.0, 5), np.linspace(0.0, 1.0, 4)
+    small = TableData(x, y, np.add.outer(x, y)).spline()
+    block = replace(block, tables=[replace(g, spline=small) for g in block.tables])
+    return replace(made, step=replace(made.step, block=block))
+
+
+@pytest.mark.parametrize("name", EVERY)
 def test_no_message_on_a_required_misra_rule(name: str, tmp_path: Path) -> None:
-    write_folder(program_of(name), PREFIX, False, tmp_path)
-    for real in (0, 1):
+    made = with_small_tables(program_of(name))
+    write_folder(made, PREFIX, False, tmp_path)
+    for real in (0,) if made.look_ups else (0, 1):
         command = ["cppcheck", "--quiet", "--enable=warning,style,portability", "--addon=misra", f"-DCTL_DOUBLE={real}"]
         sources = ["ctl.c", "ctl_interface.c"]
         done = subprocess.run([*command, *sources], cwd=tmp_path, capture_output=True, text=True, check=False)
@@ -231,7 +249,7 @@ def test_no_message_on_a_required_misra_rule(name: str, tmp_path: Path) -> None:
         rules = set(re.findall(r"misra-c2012-([0-9.]+)", done.stderr))
         assert rules, "the addon says something about these files; if not, it has not run"
         # Advisory, each with its reason in docs/export.md.
-        assert rules <= {"2.5", "8.7", "11.5", "20.10"}, done.stderr
+        assert rules <= {"2.5", "8.7", "8.9", "11.5", "20.10"}, done.stderr
 
 
 def test_a_library_is_known_by_its_interface(tmp_path: Path) -> None:

@@ -195,10 +195,6 @@ def test_what_has_no_sampled_form_is_refused() -> None:
         discretise(block_of("Matching"), 0.0)
     with pytest.raises(GustformError, match="GF4101"):
         literal(math.inf)
-    from tests.components.systems import sampled_table
-
-    with pytest.raises(GustformError, match=r"GF4101.*table"):
-        block_of(Looking(curve=sampled_table()))
 
 
 # ---- printed functions ----------------------------------------------------------------------------------------------

@@ -95,11 +95,11 @@ int main(void)
 
 def test_what_is_not_installed_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(GustformError, match=r"GF4105.*qemu-system-arm"):
+    with pytest.raises(GustformError, match=r"GF4110.*qemu-system-arm"):
         pil.require()
 
 
 def test_samples_without_a_record_are_no_result(tmp_path: Path) -> None:
     (tmp_path / "records.bin").write_bytes(b"\0" * 24)
-    with pytest.raises(GustformError, match="GF4106"):
+    with pytest.raises(GustformError, match="GF4111"):
         pil._read(tmp_path / "records.bin")

@@ -3,14 +3,15 @@
     dx/dt = f(x, u, p),      y = g(x, u, p)
 
 It is made from the declarations alone, by `flatten` of the control as a unit. Two components make one controller: the
-control of both converters and the pitch control, whose demand `beta_ref` is the output. What no output depends on is
-left out: the pitch servo, which is plant; a measurement that the control does not read.
+control of both converters and the pitch control, whose demand `beta_ref` is the output. A schedule makes a third, which
+gives the other two their operating point from tables. What no output depends on is left out: the pitch servo, which is
+plant; a measurement that the control does not read.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import casadi as ca
@@ -18,13 +19,14 @@ import casadi as ca
 from gustform.language.component import Component
 from gustform.language.declare import Input, Output, Parameter, Part, Table, Variable
 from gustform.language.errors import GustformError
+from gustform_codegen.emit.controller.look_up import Grid, expanded
 from gustform_codegen.emit.controller.ranges import INPUT_RANGES, OUTPUT_RANGES
 from gustform_codegen.flatten import flatten
 from gustform_codegen.symbolic import Substitution, key_of, keys_in, solve_for
-from gustform_codegen.unit_type import UnitType
+from gustform_codegen.unit_type import Call, UnitType
 
-# Inputs of the pitch control by the names of the turbine's quantities.
-_PITCH_INPUTS = {"P": "P_pmsg"}
+# Inputs of the pitch control and of the schedule by the names of the turbine's quantities.
+_RENAMED = {"P": "P_pmsg"}
 _PITCH_OUTPUT = "beta_ref"
 
 
@@ -48,7 +50,10 @@ class Signal:
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """dx/dt = rates(x, u, p); y = results(x, u, p); all SX in the symbols of states, inputs and parameters."""
+    """dx/dt = rates(x, u, p); y = results(x, u, p); all SX in the symbols of states, inputs and parameters.
+
+    `calls` are the look-ups in `tables` that they contain, in an order in which they can be evaluated.
+    """
 
     name: str
     description: str
@@ -58,10 +63,17 @@ class Block:
     states: list[Signal]
     rates: list[Any]
     parameters: list[Signal]
+    tables: list[Grid] = field(default_factory=list)
+    calls: list[Call] = field(default_factory=list)
 
 
-def controller_block(control: Component, pitch: Component, values: Mapping[str, float] | None = None) -> Block:
-    """The controller of a turbine: both converters and the pitch demand.
+def controller_block(
+    control: Component,
+    pitch: Component,
+    values: Mapping[str, float] | None = None,
+    schedule: Component | None = None,
+) -> Block:
+    """The controller of a turbine: both converters and the pitch demand; with `schedule` also their operating point.
 
     `values` are found numbers by path, "control.gsc.Q_ref" or "pitch.P_filtered": free parameters and states of a
     steady state. GF4101 if a control cannot be exported.
@@ -70,23 +82,44 @@ def controller_block(control: Component, pitch: Component, values: Mapping[str, 
     kind = type(control)
     parts = [
         _Piece(control, "control", {}, list(kind.declared(Output)), values),
-        _Piece(pitch, "pitch", _PITCH_INPUTS, [_PITCH_OUTPUT], values),
+        _Piece(pitch, "pitch", _RENAMED, [_PITCH_OUTPUT], values),
     ]
+    given: dict[str, Any] = {}
+    if schedule is not None:
+        part = _Piece(schedule, "schedule", _RENAMED, list(type(schedule).declared(Output)), values)
+        given = {s.name: result for s, result in zip(part.outputs, part.results, strict=True)}
+        part.outputs, part.results = [], []
+        parts.append(part)
     inputs: dict[str, Signal] = {}
-    same = Substitution()
+    same, point = Substitution(), Substitution()
     for part in parts:
         for signal in part.inputs:
-            if signal.name in inputs:
+            if signal.name in given:
+                point.add(signal.symbol, given[signal.name])
+            elif signal.name in inputs:
                 same.add(signal.symbol, inputs[signal.name].symbol)
             else:
                 inputs[signal.name] = signal
+
+    def joined(expressions: list[Any]) -> list[Any]:
+        return same.apply(point.apply(expressions))
+
     states = [s for part in parts for s in part.states]
-    rates = same.apply([r for part in parts for r in part.rates])
+    rates = joined([r for part in parts for r in part.rates])
     outputs = [s for part in parts for s in part.outputs]
-    results = same.apply([r for part in parts for r in part.results])
-    kept = _needed(states, rates, results)
+    results = joined([r for part in parts for r in part.results])
+    tables = [grid for part in parts for grid in part.tables]
+    calls = []
+    for part in parts:
+        first = sum(len(p.tables) for p in parts[: parts.index(part)])
+        for call in part.calls:
+            x, y = joined([call.x, call.y])
+            calls.append(replace(call, table=first + call.table, x=x, y=y))
+    kept = _needed(states, rates, results, calls)
     states, rates = [states[k] for k in kept], [rates[k] for k in kept]
-    used = {key for expression in [*rates, *results] for key in keys_in(expression)}
+    used = {key for e in [*rates, *results] for part in expanded(e, calls) for key in keys_in(part)}
+    calls = [call for call in calls if key_of(call.value) in used]
+    looked_up = sorted({call.table for call in calls})
     return Block(
         kind.__name__,
         (kind.__doc__ or kind.__name__).strip().splitlines()[0],
@@ -96,6 +129,8 @@ def controller_block(control: Component, pitch: Component, values: Mapping[str, 
         states,
         rates,
         [s for part in parts for s in part.parameters if key_of(s.symbol) in used],
+        [tables[k] for k in looked_up],
+        [replace(call, table=looked_up.index(call.table)) for call in calls],
     )
 
 
@@ -114,16 +149,20 @@ def alone(component: Component) -> Component:
     return type(component)(**given)
 
 
-def _needed(states: list[Signal], rates: list[Any], results: list[Any]) -> list[int]:
-    """The states that an output depends on, directly or through others."""
+def _needed(states: list[Signal], rates: list[Any], results: list[Any], calls: list[Call]) -> list[int]:
+    """The states that an output depends on, directly or through others or a table."""
     index = {key_of(s.symbol): k for k, s in enumerate(states)}
+
+    def read(expression: Any) -> list[int]:
+        return [index[key] for part in expanded(expression, calls) for key in keys_in(part) if key in index]
+
     wanted: set[int] = set()
-    pending = [index[key] for r in results for key in keys_in(r) if key in index]
+    pending = [k for r in results for k in read(r)]
     while pending:
         k = pending.pop()
         if k not in wanted:
             wanted.add(k)
-            pending += [index[key] for key in keys_in(rates[k]) if key in index]
+            pending += read(rates[k])
     return sorted(wanted)
 
 
@@ -163,12 +202,22 @@ class _Piece:
         self.outputs, self.results = [], []
         for name in outputs:
             sign, expression = _value_of(self.unit, name)
-            low, high = self._range(OUTPUT_RANGES, name)
+            low, high = self._range(
+                {**INPUT_RANGES, **OUTPUT_RANGES}, name
+            )  # what a schedule gives is an input of others
             d = self.copy.declared(Variable)[name]
             start, nominal = self.copy.start_value(d), self.copy.number(d.nominal)
             self.outputs.append(Signal(name, None, d.unit, d.description, low, high, start, nominal))
             self.results.append(sign * expression)
         self.results = self.bound.apply(self.results)
+        self.tables = [self._grid(ref.owner.path, ref.declaration) for ref in self.unit.tables]
+        self.calls = [
+            replace(call, x=x, y=y) for call in self.unit.calls for x, y in [self.bound.apply([call.x, call.y])]
+        ]
+
+    def _grid(self, owner: str, declared: Any) -> Grid:
+        path = f"{owner}.{declared.name}" if owner else declared.name
+        return Grid(self._c_name(path), declared, self.copy.at(owner).table(declared.name).spline())
 
     def _fail(self, what: str, hint: str) -> GustformError:
         return GustformError("GF4101", f"{self.name} cannot be exported as a sampled controller: {what}", hint=hint)
@@ -180,8 +229,6 @@ class _Piece:
             raise self._fail(f"{', '.join(loops)} must be iterated on", "explicit equations")
         if unit.discretes or unit.whens:
             raise self._fail("it has events", "limit(), maximum(), minimum()")
-        if unit.calls:
-            raise self._fail("it looks up a table", "the look-up in the operating schedule, outside of the control")
         if unit.externals:
             raise self._fail(f"it has a connector ({unit.externals[0].path})", "inputs and outputs only")
 

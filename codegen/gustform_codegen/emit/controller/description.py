@@ -9,7 +9,7 @@ from typing import Any
 
 from gustform.language.errors import GustformError
 from gustform_codegen.emit.controller.block import Signal
-from gustform_codegen.emit.controller.c_files import ERRORS, Names
+from gustform_codegen.emit.controller.c_files import Names, errors_of
 from gustform_codegen.emit.controller.program import Program
 
 
@@ -49,7 +49,18 @@ def describe(program: Program, names: Names) -> dict[str, Any]:
     result["states"] = [
         {"name": s.name, "unit": s.unit, "description": s.description, "start": s.value} for s in block.states
     ]
-    result["errors"] = [{"name": name, "mask": 1 << k, "description": text} for k, (name, text) in enumerate(ERRORS)]
+    result["tables"] = [
+        {
+            "name": g.name,
+            "unit": g.declared.unit,
+            "description": g.declared.description,
+            "x": [g.spline["x_start"], g.x_end],
+            "y": [g.spline["y_start"], g.y_end],
+            "coefficients": int(g.spline["coefficient"].size),
+        }
+        for g in block.tables
+    ]
+    result["errors"] = [{"name": name, "mask": mask, "description": text} for mask, name, text in errors_of(program)]
     return result
 
 

@@ -21,6 +21,13 @@ T_release has no part in the sampled one, which is exact:
 I_r: the step of dI/dt = r. The integral is within its limits, also when they move, after each step, and comes off in
 the very sample in which r changes its sign. All other limiters are part of g or of u, and evaluated as they are; a
 limiter in the rate of a state that is no such clamp is refused (GF4102).
+
+A rate that looks up a table bends with its state. Its step is the one above for the rate's tangent at m,
+
+    d = h/2 f(m)/(1 - h/2 f'(m)),      x = m + d,      m+ = x + d                  (tustin)
+
+one look-up of the value and one of the slope, of second order, and exact where f is linear. A slope above zero counts
+as zero, so that the divisor is never less than one.
 """
 
 from __future__ import annotations
@@ -36,7 +43,9 @@ import numpy as np
 from gustform.language.errors import GustformError
 from gustform.language.operators import limit
 from gustform_codegen.emit.controller.block import Block, Signal
+from gustform_codegen.emit.controller.look_up import Evaluations, expanded, slope_of
 from gustform_codegen.symbolic import Substitution, key_of, keys_in, solve_for, solve_linear
+from gustform_codegen.unit_type import Call
 
 _DAMPED = 0.7  # a group with a smaller damping ratio is pre-warped
 _HALVINGS, _DEGREE = 6, 12  # phi(z): Taylor of z/64, then doubled
@@ -53,7 +62,10 @@ class Method(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """memory+ and outputs as SX in the memory, the inputs and the parameters of a block."""
+    """memory+ and outputs as SX in the memory, the inputs and the parameters of a block, and in what is looked up.
+
+    `calls` are made in this order; the arguments of each are in the same symbols and the values of those before it.
+    """
 
     block: Block
     method: Method
@@ -63,6 +75,7 @@ class Step:
     results: list[Any]
     parameters: list[Signal]  # those that the step depends on
     prewarped: dict[str, float]  # states of a pre-warped group and its frequency, rad/s
+    calls: list[Call]
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,8 +100,14 @@ def discretise(block: Block, period: float, method: Method = Method.tustin) -> S
     known = Substitution()
     following: list[Any] = [None] * len(memory)
     prewarped: dict[str, float] = {}
-    for group in groups(symbols, rates, clamps):
+    look_ups = Evaluations(block.calls)
+    for group in groups(symbols, rates, clamps, block.calls):
         x = [symbols[k] for k in group]
+        if any(
+            key_of(c.value) in keys_in(e) for k in group for e in expanded(rates[k], block.calls) for c in block.calls
+        ):
+            _by_tangent(block, group, clamps, look_ups, known, memory, following, period, method)
+            continue
         f = known.apply([rates[k] for k in group])
         jacobian = ca.jacobian(ca.vertcat(*f), ca.vertcat(*x))
         if ca.depends_on(jacobian, ca.vertcat(*x)):
@@ -125,19 +144,62 @@ def discretise(block: Block, period: float, method: Method = Method.tustin) -> S
             following[k] = _kept(value, clamps[k], known)
         for symbol, value in zip(x, solved, strict=True):
             known.add(symbol, value)
-    results = known.apply(block.results)
-    used = {key for e in [*following, *results] for key in keys_in(e)}
+    results = look_ups.place(block.results, known)
+    calls = _called(look_ups.made, [*following, *results])
+    used = {key for e in [*following, *results, *(a for c in calls for a in (c.x, c.y))] for key in keys_in(e)}
     parameters = [p for p in block.parameters if key_of(p.symbol) in used]
-    return Step(block, method, period, memory, following, results, parameters, prewarped)
+    return Step(block, method, period, memory, following, results, parameters, prewarped, calls)
 
 
-def groups(symbols: list[Any], rates: list[Any], clamps: list[Any]) -> list[list[int]]:
+def _called(calls: list[Call], expressions: list[Any]) -> list[Call]:
+    """The look-ups that are needed for expressions."""
+    used = {key for e in expressions for part in expanded(e, calls) for key in keys_in(part)}
+    return [c for c in calls if not used.isdisjoint(key_of(s) for s in (c.value, c.x_slope, c.y_slope))]
+
+
+def _by_tangent(
+    block: Block,
+    group: list[int],
+    clamps: list[Clamp | None],
+    look_ups: Evaluations,
+    known: Substitution,
+    memory: list[Any],
+    following: list[Any],
+    period: float,
+    method: Method,
+) -> None:
+    """The step of a state whose rate looks up a table. GF4102 if it is not alone, or clamped."""
+    if len(group) > 1 or clamps[group[0]] is not None:
+        names = ", ".join(block.states[k].name for k in group)
+        raise GustformError(
+            "GF4102",
+            f"{block.name} cannot be exported as a sampled controller: {names} look up a table together or within "
+            "limits",
+            hint="a look-up in a rate that depends on one state",
+        )
+    k = group[0]
+    x, m, rate = block.states[k].symbol, memory[k], block.rates[k]
+    at_m = known.and_also(x, m)
+    f, slope = look_ups.place([rate, slope_of(rate, x, block.calls)], at_m)
+    slope = ca.fmin(slope, ca.SX(0))
+    if method is Method.zoh:
+        solved, following[k] = m, m + period * _phi(period * slope)[0, 0] * f
+    else:
+        step = period / 2.0 if method is Method.tustin else period
+        d = step * f / (1.0 - step * slope)
+        solved = m + d
+        following[k] = solved + d if method is Method.tustin else solved
+    known.add(x, solved)
+
+
+def groups(symbols: list[Any], rates: list[Any], clamps: list[Any], calls: list[Call]) -> list[list[int]]:
     """States that depend on each other, group by group, each after those it depends on."""
     n = len(symbols)
     reach = np.eye(n, dtype=bool)
     for i in range(n):
         bounds = [] if clamps[i] is None else [clamps[i].lower, clamps[i].upper]
-        expression = ca.vertcat(rates[i], *bounds)
+        parts = [part for e in (rates[i], *bounds) for part in expanded(e, calls)]
+        expression = ca.vertcat(*parts)
         for j in range(n):
             reach[i, j] |= bool(ca.depends_on(expression, symbols[j]))
     for k in range(n):

@@ -9,7 +9,7 @@ from pathlib import Path
 from gustform.language.errors import GustformError
 from gustform_codegen.emit.controller.a2l import a2l
 from gustform_codegen.emit.controller.block import Signal
-from gustform_codegen.emit.controller.c_files import ERRORS, Names, header, source
+from gustform_codegen.emit.controller.c_files import Names, errors_of, header, source
 from gustform_codegen.emit.controller.description import as_json
 from gustform_codegen.emit.controller.host_test import host_test, vectors_header
 from gustform_codegen.emit.controller.interface import common_header, interface_header, interface_source
@@ -123,6 +123,30 @@ def _rows(signals: Sequence[Signal], start: str) -> list[str]:
     return lines
 
 
+def _tables(program: Program) -> list[str]:
+    tables = program.step.block.tables
+    if not tables:
+        return []
+    lines = [
+        "## Tables",
+        "",
+        "| name | unit | first argument | second argument | numbers | |",
+        "|---|---|---|---|---|---|",
+    ]
+    for g in tables:
+        s = g.spline
+        lines.append(
+            f"| `{g.name}` | {g.declared.unit} | {s['x_start']:g} … {g.x_end:g} | {s['y_start']:g} … {g.y_end:g} "
+            f"| {s['coefficient'].size} | {g.declared.description} |"
+        )
+    return [
+        *lines,
+        "",
+        "Constant data of the object: coefficients of bicubic splines on uniform grids. Beyond a grid its edge counts.",
+        "",
+    ]
+
+
 def _readme(program: Program, names: Names) -> str:
     block, step, p, upper = program.step.block, program.step, names.prefix, names.upper
     warped = [f"- `{name}` is pre-warped at {w:.4g} rad/s." for name, w in step.prewarped.items()]
@@ -179,11 +203,12 @@ def _readme(program: Program, names: Names) -> str:
         "",
         f"Write them into `p`, then call `{p}_recalibrate`: all are taken over or, if one is out of its range, none.",
         "",
+        *_tables(program),
         "## Error signal",
         "",
         "| bit | name | |",
         "|---|---|---|",
-        *[f"| {k} | `{upper}_{name}` | {text} |" for k, (name, text) in enumerate(ERRORS)],
+        *[f"| {mask.bit_length() - 1} | `{upper}_{name}` | {text} |" for mask, name, text in errors_of(program)],
         "",
     ]
     return "\n".join(lines)

@@ -1,9 +1,9 @@
 """Frequency response of the discrete controller beside the continuous one.
 
 Both are linearised at one point: inputs and states at their start values, integrals with limits at a quarter between
-them, so that no limiter acts. G(jw) = C (jw - A)^-1 B + D of the equations, G_d(e^jwh) of the step; the error is
-|G_d - G| over the largest |G| of the same pair. Frequencies: eight per decade from 0.1 Hz to 0.4 of the sampling
-frequency.
+them, so that no limiter acts; tables by their tangent planes. G(jw) = C (jw - A)^-1 B + D of the equations,
+G_d(e^jwh) of the step; the error is |G_d - G| over the largest |G| of the same pair. Frequencies: eight per decade from
+0.1 Hz to 0.4 of the sampling frequency.
 """
 
 from __future__ import annotations
@@ -17,7 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gustform_codegen.emit.controller.discretise import Step, unclamped
-from gustform_codegen.symbolic import key_of, keys_in
+from gustform_codegen.emit.controller.look_up import Grid, spline_at
+from gustform_codegen.symbolic import Substitution, key_of, keys_in
+from gustform_codegen.unit_type import Call
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
@@ -60,9 +62,16 @@ def frequency_response(step: Step) -> list[Pair]:
     at_x = ca.DM([numbers[key_of(s.symbol)] for s in block.states])
     at_u = ca.DM([s.value for s in block.inputs])
     at_p = ca.DM([s.value for s in block.parameters])
-    continuous = _state_space(rates, block.results, x, u, p, at_x, at_u, at_p)
+
+    def at_point(expressions: list[Any], calls: list[Call], state: Any) -> list[Any]:
+        return _tangent(expressions, calls, block.tables, ca.vertcat(state, u, p), ca.vertcat(at_x, at_u, at_p))
+
+    n = len(rates)
+    smooth = at_point([*rates, *block.results], block.calls, x)
+    continuous = _state_space(smooth[:n], smooth[n:], x, u, p, at_x, at_u, at_p)
     # An integral off its limits, and m = x: by half a step of f beside the point, where all is linear.
-    discrete = _state_space(step.memory_next, step.results, m, u, p, at_x, at_u, at_p)
+    smooth = at_point([*step.memory_next, *step.results], step.calls, m)
+    discrete = _state_space(smooth[:n], smooth[n:], m, u, p, at_x, at_u, at_p)
     top = math.log10(0.4 / step.period)
     frequency = np.logspace(-1.0, top, max(2, math.ceil(_PER_DECADE * (top + 1.0)) + 1))
     jw: Complex = 2j * np.pi * frequency
@@ -74,6 +83,22 @@ def frequency_response(step: Step) -> list[Pair]:
             if np.any(G[:, i, j] != 0.0):
                 pairs.append(Pair(source.name, output.name, frequency, G[:, i, j], G_d[:, i, j]))
     return pairs
+
+
+def _tangent(expressions: list[Any], calls: list[Call], tables: list[Grid], symbols: Any, at: Any) -> list[Any]:
+    """Expressions with each look-up replaced by its tangent plane at a point; slopes count as constants."""
+    known = Substitution()
+    for call in calls:
+        x, y = known.apply([call.x, call.y])
+        x_0, y_0 = (float(v) for v in ca.Function("place", [symbols], [x, y])(at))
+        value, x_slope, y_slope = (
+            spline_at(tables[call.table], x_0, y_0, *slopes)
+            for slopes in ((False, False), (True, False), (False, True))
+        )
+        known.add(call.value, value + x_slope * (x - x_0) + y_slope * (y - y_0))
+        known.add(call.x_slope, ca.SX(x_slope))
+        known.add(call.y_slope, ca.SX(y_slope))
+    return known.apply(expressions)
 
 
 def _number(expression: Any, numbers: dict[int, float]) -> float:

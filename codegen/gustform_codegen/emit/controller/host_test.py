@@ -36,7 +36,7 @@ def host_test(program: Program, names: Names) -> str:
     c.p.{parameter} = bad[0];
     expect(({p}_recalibrate(&c) & {upper}_PARAMETER) != 0U, "a parameter that is not a number is refused");
     write_inputs(&c, inputs[0]);
-    expect({p}_step(&c) == {upper}_PARAMETER, "and the last calibration stays");
+    expect(({p}_step(&c) & {upper}_PARAMETER) != 0U, "and the last calibration stays");
     (void){p}_startup(&c);"""
         if parameter
         else ""

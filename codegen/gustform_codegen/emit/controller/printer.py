@@ -31,11 +31,12 @@ def literal(value: float) -> str:
 
 
 def statements(
-    function: Any, read: Callable[[int, int], str], write: Callable[[int, str], str]
+    function: Any, read: Callable[[int, int], str], write: Callable[[int, str], str], named: str = "v"
 ) -> tuple[list[str], set[str]]:
     """The statements of a function with one output vector, and which of "sin", "cos", "sqrt", "floor" they call.
 
     `read(argument, element)` is the C text of an input; `write(element, text)` the statement that stores an output.
+    Intermediate values have the names `named`0, `named`1 and so on.
     """
     lines: list[str] = []
     calls: set[str] = set()
@@ -51,7 +52,7 @@ def statements(
         elif op == ca.OP_ASSIGN:
             work[out[0]] = work[a[0]]
         else:
-            name = f"v{k}"
+            name = f"{named}{k}"
             lines.append(f"const real {name} = {_expression(op, [work[i] for i in a], calls)};")
             work[out[0]] = name
     return lines, calls
@@ -74,6 +75,8 @@ def _expression(op: int, a: Sequence[str], calls: set[str]) -> str:
         return f"({a[0]} > {a[1]}) ? {a[0]} : {a[1]}"
     if op == ca.OP_FABS:
         return f"({a[0]} < R(0.0)) ? -{a[0]} : {a[0]}"
+    if op == ca.OP_LE:
+        return f"({a[0]} <= {a[1]}) ? R(1.0) : R(0.0)"
     for known, name in ((ca.OP_SQRT, "sqrt"), (ca.OP_FLOOR, "floor"), (ca.OP_SIN, "sin"), (ca.OP_COS, "cos")):
         if op == known:
             calls.add(name)

@@ -3,9 +3,10 @@
     c = prepare(p)                       at startup and recalibration
     (memory+, y) = step(memory, u, c)    in each sample
 
-Both are CasADi functions, made from the instruction list of the whole step. A division by something constant becomes a
-multiplication by its reciprocal, which is one of c. The C is printed from these very functions, in their order, so
-that C in double and CasADi give the same bits.
+Where tables are looked up, in each sample the arguments of one look-up after the other are computed before the step,
+and what was looked up, t, is an argument as well. All are CasADi functions, made from the instruction list of the whole
+step. A division by something constant becomes a multiplication by its reciprocal, which is one of c. The C is printed
+from these very functions, in their order, so that C in double and CasADi give the same bits.
 """
 
 from __future__ import annotations
@@ -18,18 +19,39 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gustform_codegen.emit.controller.discretise import Step
+from gustform_codegen.emit.controller.look_up import spline_at
+from gustform_codegen.symbolic import key_of, keys_in
 
 Array = NDArray[np.float64]
 
 
+@dataclass(frozen=True)
+class Wanted:
+    """One number of a look-up: its value, or its slope along x or y."""
+
+    x_slope: bool
+    y_slope: bool
+
+
+@dataclass(frozen=True, eq=False)
+class LookUp:
+    """arguments: (memory, u, c, t) -> x and y; t holds what `wanted` says from `first` on."""
+
+    table: int
+    arguments: Any
+    wanted: tuple[Wanted, ...]
+    first: int
+
+
 @dataclass(frozen=True, eq=False)
 class Program:
-    """prepare: (p) -> c; advance: (memory, u, c) -> memory+ and y in one vector."""
+    """prepare: (p) -> c; advance: (memory, u, c, t) -> memory+ and y in one vector; no t without look-ups."""
 
     step: Step
     prepare: Any
     advance: Any
     n_constants: int
+    look_ups: tuple[LookUp, ...] = ()
 
 
 def program(step: Step) -> Program:
@@ -37,13 +59,14 @@ def program(step: Step) -> Program:
     memory = ca.vertcat(*step.memory) if step.memory else ca.SX.sym("memory", 0)
     inputs = ca.vertcat(*[s.symbol for s in step.block.inputs])
     parameters = ca.vertcat(*[s.symbol for s in step.parameters])
-    whole = ca.Function(
-        "whole", [memory, inputs, parameters], [ca.densify(ca.vertcat(*step.memory_next, *step.results))], {"cse": True}
-    )
-    arguments = [memory, inputs, parameters]
+    looked_up, look_ups = _wanted(step)
+    t = [ca.vertcat(*looked_up)] if looked_up else []
+    outputs = [*step.memory_next, *step.results, *(a for call in step.calls for a in (call.x, call.y))]
+    arguments = [memory, inputs, parameters, *t]
+    whole = ca.Function("whole", arguments, [ca.densify(ca.vertcat(*outputs))], {"cse": True})
     splitter = _Splitter()
     work: dict[int, _Node] = {}
-    results: list[Any] = [None] * (len(step.memory_next) + len(step.results))
+    results: list[Any] = [None] * len(outputs)
     for k in range(whole.n_instructions()):
         op, a, out = whole.instruction_id(k), whole.instruction_input(k), whole.instruction_output(k)
         if op == ca.OP_INPUT:
@@ -57,8 +80,32 @@ def program(step: Step) -> Program:
     constants = ca.vertcat(*splitter.symbols) if splitter.symbols else ca.SX.sym("c", 0)
     values = ca.densify(ca.vertcat(*splitter.values)) if splitter.values else ca.SX(0, 1)
     prepare = ca.Function("prepare", [parameters], [values], {"cse": True})
-    advance = ca.Function("advance", [memory, inputs, constants], [ca.densify(ca.vertcat(*results))], {"cse": True})
-    return Program(step, prepare, advance, len(splitter.symbols))
+    of_step = [memory, inputs, constants, *t]
+    n = len(outputs) - 2 * len(step.calls)
+    advance = ca.Function("advance", of_step, [ca.densify(ca.vertcat(*results[:n]))], {"cse": True})
+    made = []
+    for k, (call, (first, wanted)) in enumerate(zip(step.calls, look_ups, strict=True)):
+        place = ca.densify(ca.vertcat(*results[n + 2 * k : n + 2 * k + 2]))
+        made.append(LookUp(call.table, ca.Function(f"place_{k}", of_step, [place], {"cse": True}), wanted, first))
+    return Program(step, prepare, advance, len(splitter.symbols), tuple(made))
+
+
+def _wanted(step: Step) -> tuple[list[Any], list[tuple[int, tuple[Wanted, ...]]]]:
+    """The symbols of t, and for each look-up its first place there and what is wanted of it."""
+    expressions = [*step.memory_next, *step.results, *(a for call in step.calls for a in (call.x, call.y))]
+    used = {key for e in expressions for key in keys_in(e)}
+    symbols: list[Any] = []
+    result = []
+    for call in step.calls:
+        kinds = (
+            (call.value, Wanted(False, False)),
+            (call.x_slope, Wanted(True, False)),
+            (call.y_slope, Wanted(False, True)),
+        )
+        some = [(symbol, wanted) for symbol, wanted in kinds if key_of(symbol) in used]
+        result.append((len(symbols), tuple(wanted for _, wanted in some)))
+        symbols += [symbol for symbol, _ in some]
+    return symbols, result
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,8 +181,19 @@ class Evaluator:
         """One sample. One that is not finite or out of range changes nothing."""
         good = bool(np.all((inputs >= self.low) & (inputs <= self.high)))
         if good:
-            found = np.asarray(self.program.advance(self.memory, inputs, self.constants)).ravel()
+            known = [self.memory, inputs, self.constants, *self._look_up(inputs)]
+            found = np.asarray(self.program.advance(*known)).ravel()
             n = self.memory.size
             self.memory = found[:n]
             self.outputs = np.minimum(np.maximum(found[n:], self.out_low), self.out_high)
         return self.outputs.copy(), good
+
+    def _look_up(self, inputs: Array) -> list[Array]:
+        """t, or nothing without look-ups."""
+        t = np.zeros(sum(len(one.wanted) for one in self.program.look_ups))
+        for one in self.program.look_ups:
+            x, y = np.asarray(one.arguments(self.memory, inputs, self.constants, t)).ravel()
+            grid = self.program.step.block.tables[one.table]
+            for k, wanted in enumerate(one.wanted):
+                t[one.first + k] = spline_at(grid, float(x), float(y), wanted.x_slope, wanted.y_slope)
+        return [t] if t.size else []

@@ -21,6 +21,7 @@ INPUT_RANGES: Mapping[str, tuple[float, float]] = {
     "v_d": (-2.0, 2.0),
     "v_q": (-2.0, 2.0),
     "wind": (0.0, 100.0),
+    "beta": (-10.0, 90.0),
 }
 
 OUTPUT_RANGES: Mapping[str, tuple[float, float]] = {
