@@ -8,7 +8,6 @@ measured.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,8 +63,8 @@ def largest(a: Rows, b: Rows, name: str) -> float:
 
 
 @pytest.fixture(scope="module", params=CONTROLS)
-def control(request: pytest.FixtureRequest) -> Iterator[tuple[str, Rows]]:
-    yield str(request.param), rows(case(request.param))
+def control(request: pytest.FixtureRequest) -> tuple[str, Rows]:
+    return str(request.param), rows(case(request.param))
 
 
 def check(found: Rows, continuous: Rows, bound: Bound) -> None:
