@@ -90,8 +90,9 @@ void gust_e2e_protect(const gust_e2e *e2e, uint8_t *data, size_t length, uint8_t
 {
     const uint8_t count = (uint8_t)(counter % gust_e2e_modulo(e2e));
 
-    if (header(e2e) == 0 || length < header(e2e))
+    if (header(e2e) == 0 || length < header(e2e)) {
         return;
+    }
     if (e2e->profile == 5) {
         data[2] = count;
         const uint16_t crc = crc_profile_5(e2e, data, length);
@@ -108,11 +109,12 @@ bool gust_e2e_good(const gust_e2e *e2e, const uint8_t *data, size_t length, uint
     uint8_t count = 0;
     bool good = true;
 
-    if (length < header(e2e))
+    if (length < header(e2e)) {
         return false;
+    }
     if (e2e->profile == 5) {
         count = data[2];
-        good = (uint16_t)(data[0] | (data[1] << 8)) == crc_profile_5(e2e, data, length);
+        good = ((uint32_t)data[0] | (uint32_t)data[1] << 8U) == crc_profile_5(e2e, data, length);
     } else if (e2e->profile == 1) {
         count = data[1] & 0x0FU;
         good = count < 15U && data[0] == crc_profile_1(e2e, data, length);
@@ -120,7 +122,8 @@ bool gust_e2e_good(const gust_e2e *e2e, const uint8_t *data, size_t length, uint
         count = data[1] & 0x0FU;
         good = data[0] == crc_profile_2(e2e, data, length);
     }
-    if (good)
+    if (good) {
         *counter = count;
+    }
     return good;
 }

@@ -38,7 +38,7 @@ typedef enum gust_state {
 
 typedef enum gust_fault {
 #define GUST_FAULT_BIT(bit, name, sentence) GUST_FAULT_##name = 1 << (bit),
-    GUST_FAULT_LIST(GUST_FAULT_BIT)
+    GUST_FAULT_LIST(GUST_FAULT_BIT) /* NOLINT(bugprone-signed-bitwise): enumerators are int */
 #undef GUST_FAULT_BIT
 } gust_fault;
 
