@@ -24,6 +24,8 @@ BUILD_STAMPS := build/.stamps-$(PLACE)
 C_CONFIGURATION := CMakeLists.txt $(shell find runtime tests/c hil/bridge -name CMakeLists.txt -o -name '*.cmake' 2>/dev/null)
 RUNTIME_SOURCES := $(shell find runtime/include runtime/src -type f 2>/dev/null)
 TEST_SOURCES := $(shell find tests/c hil/bridge -type f 2>/dev/null)
+# For clang-tidy: the bridge is compiled in a rig, with a controller and a message set.
+BRIDGE_FLAGS := -std=gnu11 -Ihil/bridge/include -Icodegen/gustform_codegen/emit/controller -DGUST_BRIDGE_PREFIX=dual_port
 
 PIP_INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-input --constraint tools/constraints.txt
 # Set-up runs in a make of its own under a lock, so that two makes in one work tree do not both build it.
@@ -70,6 +72,10 @@ check: setup-dev ## ruff, mypy --strict, the layers and clang-format: seconds, n
 lint: check ## The quick checks and clang-tidy
 	$(call say,clang-tidy)
 	@git ls-files -z 'runtime/src/*.c' | xargs -0r -n 1 -P "$$(nproc)" $(BIN)/clang-tidy --quiet -p build/release
+	@git ls-files -z 'hil/bridge/src/*.c' | \
+		xargs -0rI@ -P "$$(nproc)" $(BIN)/clang-tidy --quiet @ -- $(BRIDGE_FLAGS) -D_GNU_SOURCE
+	@git ls-files -z 'hil/vcan/*.c' 'hil/realtime/*.c' | \
+		xargs -0rI@ -P "$$(nproc)" $(BIN)/clang-tidy --quiet @ -- $(BRIDGE_FLAGS)
 
 .PHONY: test-c
 test-c: setup-dev ## C tests with AddressSanitizer and UBSan
@@ -209,6 +215,6 @@ $(BUILD_STAMPS)/sanitize-configured: $(C_CONFIGURATION) | $(BUILD_STAMPS)/system
 	@touch $@
 
 $(BUILD_STAMPS)/sanitize: $(BUILD_STAMPS)/sanitize-configured $(RUNTIME_SOURCES) $(TEST_SOURCES)
-	$(call say,C runtime and its tests with ASan and UBSan)
+	$(call say,C runtime and bridge and their tests with ASan and UBSan)
 	@$(QUIETLY) build/sanitize.log cmake --build build/sanitize --parallel
 	@touch $@

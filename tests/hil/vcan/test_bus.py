@@ -7,9 +7,8 @@ import socket
 import struct
 import subprocess
 
-import pytest
-
 import can
+import pytest
 
 INTERFACE = os.environ.get("GUSTFORM_VCAN_INTERFACES", "vcan0").split(",")[0]
 PATIENCE = 20.0
