@@ -94,6 +94,11 @@ test-hil: setup-dev ## Tests on a real vcan: this kernel's, else one in user-mod
 	$(call say,tests on a CAN bus)
 	@$(BIN)/python hil/vcan/with-vcan $(BIN)/python -m pytest -p no:cacheprovider tests/hil/vcan $(ARGS)
 
+.PHONY: mutate
+mutate: setup-dev ## Every mutation of the bridge's supervision, each to be caught by its unit tests
+	$(call say,mutations of hil/bridge/src/supervision.c)
+	@$(BIN)/python hil/bridge/tests/mutate.py $(ARGS)
+
 .PHONY: bench
 bench: setup-dev ## Speed as ratios against a bare program and against CasADi
 	@$(BIN)/python -m tests.bench $(ARGS)

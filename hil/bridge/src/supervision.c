@@ -23,9 +23,8 @@ void gust_limits_default(gust_limits *limits)
 
 void gust_supervision_start(gust_supervision *s, const gust_limits *limits)
 {
-    memset(s, 0, sizeof *s);
+    memset(s, 0, sizeof *s); /* state INIT, nothing heard */
     s->limits = *limits;
-    s->state = GUST_STATE_INIT;
 }
 
 void gust_supervision_raise(gust_supervision *s, uint32_t faults)
@@ -43,25 +42,17 @@ void gust_supervision_raise(gust_supervision *s, uint32_t faults)
 
 void gust_supervision_reject(gust_supervision *s, gust_decoded why, bool cyclic)
 {
-    switch (why) {
-    case GUST_WRONG_LENGTH:
-        s->reasons |= cyclic ? (uint32_t)GUST_FAULT_LENGTH : 0U;
-        break;
-    case GUST_BAD_CRC:
-        s->reasons |= cyclic ? (uint32_t)GUST_FAULT_CRC : 0U;
-        break;
-    case GUST_UNKNOWN_MULTIPLEXER:
-        gust_supervision_raise(s, GUST_FAULT_MULTIPLEXER);
-        break;
-    case GUST_NOT_FINITE:
-        gust_supervision_raise(s, GUST_FAULT_NOT_FINITE);
-        break;
-    case GUST_OUT_OF_RANGE:
-        gust_supervision_raise(s, GUST_FAULT_RANGE);
-        break;
-    case GUST_DECODED:
-    case GUST_UNKNOWN_ID:
-        break;
+    static const uint32_t FAULTS[] = {[GUST_DECODED] = 0,
+                                      [GUST_UNKNOWN_ID] = 0,
+                                      [GUST_WRONG_LENGTH] = GUST_FAULT_LENGTH,
+                                      [GUST_BAD_CRC] = GUST_FAULT_CRC,
+                                      [GUST_UNKNOWN_MULTIPLEXER] = GUST_FAULT_MULTIPLEXER,
+                                      [GUST_NOT_FINITE] = GUST_FAULT_NOT_FINITE,
+                                      [GUST_OUT_OF_RANGE] = GUST_FAULT_RANGE};
+    if (why != GUST_WRONG_LENGTH && why != GUST_BAD_CRC) {
+        gust_supervision_raise(s, FAULTS[why]);
+    } else if (cyclic) {
+        s->reasons |= FAULTS[why];
     }
 }
 
@@ -140,19 +131,15 @@ gust_answer gust_supervision_command(gust_supervision *s, gust_command command, 
 static uint32_t judge_sample(gust_supervision *s, const gust_period *period)
 {
     const int32_t tolerated = (int32_t)s->limits.missing;
-    uint32_t faults = 0;
     s->fresh = false;
     if (!period->sample) {
         return 0;
     }
-    /* What may be lost was missed in earlier periods, or in periods that the loop itself missed. */
-    if (s->sampled && period->lost > s->missing + (period->periods - 1U) + s->limits.drift) {
-        faults |= (uint32_t)GUST_FAULT_COUNTER;
-    }
-    /* A Sync may be lost as often as a sample, so a sample may be ahead of the last one. */
-    if (period->lag < -tolerated - 1) {
-        faults |= (uint32_t)GUST_FAULT_COUNTER;
-    }
+    /* What is lost was missed in earlier periods, or in periods that the loop itself missed; and a Sync may be
+     * lost as often as a sample, so a sample may be ahead of the last one. */
+    const uint32_t explained = s->missing + (period->periods - 1U) + s->limits.drift;
+    const bool jumped = (s->sampled && period->lost > explained) || period->lag < -tolerated - 1;
+    uint32_t faults = jumped ? (uint32_t)GUST_FAULT_COUNTER : 0;
     if (period->lag > tolerated) {
         faults |= (uint32_t)GUST_FAULT_STALE;
     } else if (period->lag > 0) {
@@ -187,11 +174,12 @@ static uint32_t count_losses(gust_supervision *s, const gust_period *period)
 /* What other messages have to say, and for how long they have not. */
 static uint32_t count_silence(gust_supervision *s, const gust_period *period)
 {
-    uint32_t faults = 0;
     s->since_heartbeat += period->periods;
     s->since_set_points += period->periods;
-    if (s->limits.heartbeat != 0 && (!s->heartbeat || s->since_heartbeat > s->limits.heartbeat)) {
-        faults |= (uint32_t)GUST_FAULT_HEARTBEAT;
+    const bool alive = s->heartbeat && s->since_heartbeat <= s->limits.heartbeat;
+    uint32_t faults = 0;
+    if (s->limits.heartbeat != 0 && !alive) {
+        faults = GUST_FAULT_HEARTBEAT;
         s->known = false; /* who comes back has to say again who it is */
         s->heartbeat = false;
     }
@@ -210,10 +198,7 @@ static uint32_t count_silence(gust_supervision *s, const gust_period *period)
 void gust_supervision_tick(gust_supervision *s, const gust_period *period)
 {
     ++s->silent;
-    uint32_t faults = 0;
-    if (period->periods > s->limits.deadlines + 1U) {
-        faults |= (uint32_t)GUST_FAULT_DEADLINE;
-    }
+    uint32_t faults = period->periods > s->limits.deadlines + 1U ? (uint32_t)GUST_FAULT_DEADLINE : 0;
     faults |= judge_sample(s, period);
     faults |= count_losses(s, period);
     faults |= count_silence(s, period);
@@ -226,15 +211,13 @@ void gust_supervision_tick(gust_supervision *s, const gust_period *period)
 
 void gust_supervision_measured(gust_supervision *s, const double *values, uint32_t n)
 {
-    uint32_t faults = 0;
+    bool jumped = false;
     for (uint32_t k = 0; k < n; ++k) {
-        if (s->measured && fabs(values[k] - s->last[k]) > s->limits.rate[k] * s->elapsed) {
-            faults |= (uint32_t)GUST_FAULT_PLAUSIBILITY;
-        }
+        jumped = jumped || fabs(values[k] - s->last[k]) > s->limits.rate[k] * s->elapsed;
         s->last[k] = values[k];
     }
+    gust_supervision_raise(s, s->measured && jumped ? (uint32_t)GUST_FAULT_PLAUSIBILITY : 0);
     s->measured = true;
-    gust_supervision_raise(s, faults);
 }
 
 void gust_supervision_stepped(gust_supervision *s, uint32_t errors)

@@ -67,9 +67,14 @@ static void bring(gust_supervision *s, gust_state state)
 static void defaults(void **unused)
 {
     (void)unused;
-    gust_limits limits;
-    memset(&limits, 0xff, sizeof limits);
-    gust_limits_default(&limits);
+    struct {
+        gust_limits limits;
+        double beyond;
+    } room;
+    memset(&room, 0xff, sizeof room);
+    gust_limits_default(&room.limits);
+    assert_true(isnan(room.beyond)); /* untouched */
+    const gust_limits limits = room.limits;
     assert_int_equal(limits.missing, 2);
     assert_int_equal(limits.drift, 1);
     assert_int_equal(limits.deadlines, 2);
@@ -390,6 +395,68 @@ static void causes_of_losses(void **unused)
     assert_int_equal(s.faults, GUST_FAULT_TIMEOUT);
 }
 
+static void lose_for_many_reasons(gust_supervision *s, gust_decoded first, gust_decoded second)
+{
+    gust_period late = GOOD;
+    late.lag = 1;
+    for (int n = 0; n < 3; ++n) {
+        gust_supervision_reject(s, first, true);
+        gust_supervision_reject(s, second, true);
+        gust_supervision_repeat(s);
+        ticks(s, &late, 1);
+    }
+}
+
+/* One reason does not hide another. */
+static void several_reasons(void **unused)
+{
+    (void)unused;
+    const uint32_t both = (uint32_t)GUST_FAULT_CRC | (uint32_t)GUST_FAULT_LENGTH;
+    gust_supervision s;
+    bring(&s, GUST_STATE_RUN);
+    lose_for_many_reasons(&s, GUST_BAD_CRC, GUST_WRONG_LENGTH);
+    assert_int_equal(s.faults, both | (uint32_t)GUST_FAULT_STALE);
+    bring(&s, GUST_STATE_RUN);
+    lose_for_many_reasons(&s, GUST_WRONG_LENGTH, GUST_BAD_CRC);
+    assert_int_equal(s.faults, both | (uint32_t)GUST_FAULT_STALE);
+    bring(&s, GUST_STATE_RUN); /* and what is no reason adds none */
+    for (int n = 0; n < 3; ++n) {
+        gust_supervision_reject(&s, GUST_BAD_CRC, false);
+        gust_supervision_reject(&s, GUST_WRONG_LENGTH, false);
+        gust_supervision_repeat(&s);
+        ticks(&s, &LOST, 1);
+    }
+    assert_int_equal(s.faults, GUST_FAULT_STALE);
+    bring(&s, GUST_STATE_RUN);
+    gust_period late = GOOD;
+    late.lag = 3;
+    late.lost = 9;
+    ticks(&s, &late, 1);
+    assert_int_equal(s.faults, GUST_FAULT_COUNTER | GUST_FAULT_STALE);
+    bring(&s, GUST_STATE_RUN);
+    const gust_period silence = {.periods = 1};
+    for (int n = 0; n < 3; ++n) {
+        gust_supervision_reject(&s, GUST_BAD_CRC, true);
+        ticks(&s, &silence, 1);
+    }
+    assert_int_equal(s.faults, GUST_FAULT_CRC | GUST_FAULT_TIMEOUT);
+    bring(&s, GUST_STATE_RUN);
+    s.limits.set_points = 300;
+    gust_supervision_heartbeat(&s);
+    gust_supervision_set_points(&s);
+    ticks(&s, &GOOD, 301);
+    assert_int_equal(s.faults, GUST_FAULT_HEARTBEAT | GUST_FAULT_TIMEOUT);
+    bring(&s, GUST_STATE_RUN);
+    gust_supervision_heartbeat(&s);
+    gust_supervision_fingerprint(&s, false);
+    gust_supervision_converter(&s, GUST_CONVERTER_TRIPPED);
+    ticks(&s, &GOOD, 300);
+    const uint32_t lasting = (uint32_t)GUST_FAULT_FINGERPRINT | (uint32_t)GUST_FAULT_CONVERTER;
+    assert_int_equal(s.faults, lasting);
+    ticks(&s, &GOOD, 1);
+    assert_int_equal(s.faults, lasting | (uint32_t)GUST_FAULT_HEARTBEAT);
+}
+
 static void wrong_under_a_good_crc(void **unused)
 {
     (void)unused;
@@ -513,6 +580,16 @@ static void missed_periods(void **unused)
     }
 }
 
+static void to_ready_again(gust_supervision *s)
+{
+    gust_supervision_heartbeat(s);
+    gust_supervision_fingerprint(s, true);
+    ticks(s, &GOOD, QUIET + 1U);
+    assert_int_equal(command(s, GUST_COMMAND_RESET), GUST_ANSWER_DONE);
+    ticks(s, &GOOD, 1);
+    assert_int_equal(s->state, GUST_STATE_READY);
+}
+
 static void heartbeat_stops(void **unused)
 {
     (void)unused;
@@ -533,13 +610,21 @@ static void heartbeat_stops(void **unused)
     gust_supervision_fingerprint(&s, true);
     ticks(&s, &GOOD, 1);
     assert_int_equal(s.state, GUST_STATE_READY);
+    /* A heartbeat that stopped stays stopped, however far its age is counted. */
+    ticks(&s, &GOOD, 301);
+    assert_int_equal(s.faults, GUST_FAULT_HEARTBEAT);
+    s.since_heartbeat = UINT32_MAX;
+    ticks(&s, &GOOD, 1);
+    assert_int_equal(s.since_heartbeat, 0);
+    assert_int_equal(s.silent, 0);
     /* periods that were missed count as well */
-    gust_period five = GOOD;
-    five.periods = 3;
+    to_ready_again(&s);
+    gust_period three = GOOD;
+    three.periods = 3;
     gust_supervision_heartbeat(&s);
-    ticks(&s, &five, 100);
+    ticks(&s, &three, 100);
     assert_int_equal(s.state, GUST_STATE_READY);
-    ticks(&s, &five, 1);
+    ticks(&s, &three, 1);
     assert_int_equal(s.state, GUST_STATE_SAFE);
     /* and where the database has none, nobody waits for it */
     bring(&s, GUST_STATE_RUN);
@@ -682,6 +767,8 @@ static void differences(void **unused)
     }
     assert_int_equal(gust_sample_difference(3, 18, 16), 1); /* b of a longer counter */
     assert_int_equal(gust_sample_difference(19, 2, 16), 1); /* a of a longer one */
+    assert_int_equal(gust_sample_difference(3, 52, 10), 1); /* and of one that is no power of two */
+    assert_int_equal(gust_sample_difference(1, 9, 10), 2);
 }
 
 int main(void)
@@ -701,6 +788,7 @@ int main(void)
         cmocka_unit_test(losses),
         cmocka_unit_test(other_limits),
         cmocka_unit_test(causes_of_losses),
+        cmocka_unit_test(several_reasons),
         cmocka_unit_test(wrong_under_a_good_crc),
         cmocka_unit_test(counter_jumps),
         cmocka_unit_test(lag),
