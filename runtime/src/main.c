@@ -226,6 +226,21 @@ static void print_statistics(const gust_sim *sim, double seconds)
         (long long)s.restarts, (long long)s.rows);
 }
 
+/* Sampled controllers that raised their error signal. */
+static void print_errors(const gust_model *model, gust_sim *sim)
+{
+    for (int32_t k = 0; k < gust_model_n_sampled(model); ++k) {
+        gust_sampled_statistics s;
+        if (gust_sim_sampled_statistics(sim, k, &s) == GUST_OK && s.bad_samples > 0) {
+            fprintf(
+                stderr,
+                "the sampled controller of %s raised its error signal in %lld of %lld samples, first at %.9g s\n",
+                gust_model_sampled_block(model, k)->name, (long long)s.bad_samples, (long long)s.samples,
+                s.first_error);
+        }
+    }
+}
+
 static double seconds_between(const struct timespec *from, const struct timespec *to)
 {
     return (double)(to->tv_sec - from->tv_sec) + 1e-9 * (double)(to->tv_nsec - from->tv_nsec);
@@ -329,6 +344,7 @@ static int run(const arguments *given, const gust_model *model, gust_sim *sim, c
     clock_gettime(CLOCK_MONOTONIC, &end);
     if (!given->quiet) {
         print_statistics(sim, seconds_between(&begin, &end));
+        print_errors(model, sim);
     }
     if (status == GUST_OK) {
         return EXIT_SUCCESS;
