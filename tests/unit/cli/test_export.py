@@ -53,6 +53,22 @@ def test_memory_is_printed_and_kept(tmp_path: Path) -> None:
     assert set(small["library"]) <= {"memcpy", "memset", "floorf"}
 
 
+@pytest.mark.parametrize("method", ["tustin", "euler", "zoh"])
+def test_the_method_is_in_the_folder_and_in_its_report(method: str, tmp_path: Path) -> None:
+    done = export("DualPort", "--out", "rig", "--method", method, "--report", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert f"DualPort, {method} at 0.001 s" in done.stdout
+    assert json.loads((tmp_path / "rig" / "dual_port.json").read_text())["method"] == method
+    error = float(
+        next(line for line in done.stdout.splitlines() if line.startswith("v_dc        omega_gsc")).split()[2]
+    )
+    bound = {"tustin": (1e-3, 2e-3), "euler": (3e-2, 5e-2), "zoh": (8e-2, 1.5e-1)}[method]  # docs/export.md
+    assert bound[0] < error < bound[1]
+    lines = (tmp_path / "rig" / "frequency.csv").read_text().splitlines()
+    assert lines[0].startswith("input,output,frequency_hz,gain")
+    assert len(lines) > 8 * 20
+
+
 def test_without_a_compiler_there_is_a_folder_all_the_same(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "gustform_cli", "export", "controller", "Matching", "--out", "rig"]
     bare = {**os.environ, "PATH": str(tmp_path)}

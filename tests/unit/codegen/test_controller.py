@@ -18,6 +18,7 @@ from gustform_codegen.emit.controller.c_files import ERRORS
 from gustform_codegen.emit.controller.description import stable_id
 from gustform_codegen.emit.controller.discretise import Method
 from gustform_codegen.emit.controller.folder import WARNINGS, default_prefix, files, write_folder
+from gustform_codegen.emit.controller.footprint import cortex, footprint
 from gustform_codegen.emit.controller.program import Evaluator, Program
 from gustform_codegen.emit.controller.vectors import input_sequence
 from gustform_codegen.toolchain import find_compiler
@@ -68,8 +69,9 @@ def test_float_follows_within_its_digits(name: str, compiled: dict[tuple[str, bo
 
 
 @pytest.mark.parametrize("method", [Method.euler, Method.zoh])
-def test_other_methods_have_the_bits_of_casadi(method: Method, tmp_path: Path) -> None:
-    one = Compiled(program_of("VirtualSynchronousMachine", method), tmp_path, True)
+@pytest.mark.parametrize("name", ["VirtualSynchronousMachine", "DualPort+estimated"])
+def test_other_methods_have_the_bits_of_casadi(name: str, method: Method, tmp_path: Path) -> None:
+    one = Compiled(program_of(name, method), tmp_path, True)
     inputs = input_sequence(one.program, 500, seed=3)
     np.testing.assert_array_equal(one.run(inputs)[0], by_casadi(one, inputs)[0])
 
@@ -103,14 +105,17 @@ def test_a_bad_sample_of_any_input_is_as_if_it_had_not_been(
 
 
 @pytest.mark.parametrize("name", EVERY)
-def test_a_denormal_is_a_number_like_others(name: str, compiled: dict[tuple[str, bool], Compiled]) -> None:
-    one = compiled[name, False]
+@pytest.mark.parametrize(("double", "denormal"), [(False, 1e-40), (True, 1e-310)])
+def test_a_denormal_is_a_number_like_others(
+    name: str, double: bool, denormal: float, compiled: dict[tuple[str, bool], Compiled]
+) -> None:
+    one = compiled[name, double]
     block = one.program.step.block
     low, high = (np.array([getattr(s, end) for s in block.outputs]) for end in ("low", "high"))
     for k, signal in enumerate(block.inputs):
         inputs = input_sequence(one.program, 40, seed=5)
         zero = inputs.copy()
-        inputs[20, k], zero[20, k] = 1e-40, 0.0
+        inputs[20, k], zero[20, k] = denormal, 0.0
         out, _, errors = one.run(inputs)
         assert np.all((out >= low) & (out <= high))
         if signal.name == "omega_r" and "estimated" in name:  # the observer divides by it
@@ -172,8 +177,11 @@ def test_an_integral_comes_off_its_limit_with_the_first_sample_of_the_other_sign
 
 
 # ---- life cycle -----------------------------------------------------------------------------------------------------
-def test_a_hundred_interleaved_instances_are_a_hundred_runs(compiled: dict[tuple[str, bool], Compiled]) -> None:
-    one = compiled["DualPort", False]
+@pytest.mark.parametrize("name", ["DualPort", "GridFollowing+estimated"])
+def test_a_hundred_interleaved_instances_are_a_hundred_runs(
+    name: str, compiled: dict[tuple[str, bool], Compiled]
+) -> None:
+    one = compiled[name, False]
     inputs = np.stack([input_sequence(one.program, 300, seed=100 + k) for k in range(100)], axis=1)
     together, memory, _ = one.run(inputs)
     for k in range(100):
@@ -291,10 +299,45 @@ def test_a_library_is_known_by_its_interface(tmp_path: Path) -> None:
     assert [one.parameters[k].high for k in range(one.n_parameters)] == [s.high for s in made.step.parameters]
     context = (ctypes.c_double * (one.context_size // 8 + 1))()
     assert one.startup(context) == 0
+    fresh = bytes(context)
     assert one.step(context) == 0
     found = [ctypes.c_float.from_buffer(context, one.outputs[k].offset).value for k in range(one.n_outputs)]
+    assert bytes(context) != fresh
+    # Start values again, with the parameters as they are.
+    gain = ctypes.c_float.from_buffer(context, one.parameters[0].offset)
+    gain.value *= 0.5
+    assert one.recalibrate(context) == 0
+    changed = bytes(context)
+    assert one.reinitialise(context) == 0
+    again = bytes(context)
+    one.startup(context)
+    assert bytes(context) == fresh
+    at = one.parameters[0].offset
+    assert again[at : at + 4] == changed[at : at + 4] != fresh[at : at + 4]
+    # Inputs, outputs and the memory before the two last words are those of the start.
+    end = one.faulty - 4
+    memory = 4 * len(block.states)
+    assert again[: one.parameters[0].offset] == fresh[: one.parameters[0].offset]
+    assert again[end - memory :] == fresh[end - memory :]
     expected = Evaluator(made).step(np.array([s.value for s in block.inputs]))[0]
     np.testing.assert_allclose(found, expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_a_microcontroller_has_room_for_it(name: str, tmp_path: Path) -> None:
+    """In float on a Cortex-M4F: nothing in double, no data, frames of at most 256 bytes, a context of at most 512."""
+    made, target = program_of(name), cortex("Cortex-M4F")
+    assert target is not None, "the set-up installs gcc-arm-none-eabi"
+    write_folder(made, PREFIX, False, tmp_path)
+    found = footprint(made, PREFIX, False, tmp_path, target)
+    assert set(found.library) <= {"sqrtf", "floorf", "memcpy", "memset"}  # so no __aeabi_dmul, no malloc
+    assert (found.data, found.bss) == (0, 0)
+    assert found.largest[1] <= 256
+    chain = [f"{PREFIX}_step", "look_up", "weights"]  # where they have not become one function
+    assert found.chain_bytes >= sum(found.frames.get(name, 0) for name in chain) >= found.frames[chain[0]] > 0
+    assert found.context <= 512
+    tables = sum(4 * len(grid.coefficient) for grid in made.step.block.tables)
+    assert found.text <= 5000 + tables
 
 
 def test_the_object_has_no_data_and_calls_little(tmp_path: Path) -> None:

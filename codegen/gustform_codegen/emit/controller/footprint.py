@@ -140,21 +140,26 @@ def _run(command: list[str]) -> str:
 
 def stack_usage(text: str) -> dict[str, int]:
     """Bytes of each function of a .su file: `file.c:12:5:name  48  static`. GF4104 if a frame has no fixed size."""
-    frames = {}
+    frames: dict[str, int] = {}
     for line in text.splitlines():
         place, size, kind = line.split("\t")
-        name = place.rsplit(":", 1)[-1]
+        name = _function(place)
         if kind not in ("static", "dynamic,bounded"):
             raise GustformError("GF4104", f"the frame of {name} has no fixed size", hint="another compiler")
-        frames[name] = int(size)
+        frames[name] = max(int(size), frames.get(name, 0))
     return frames
 
 
+def _function(title: str) -> str:
+    """The name of a function from its title: without its place, and what the optimiser makes of it has its name."""
+    return title.rsplit(":", 1)[-1].split(".", 1)[0]
+
+
 def call_graph(text: str) -> dict[str, list[str]]:
-    """Who calls whom, of a .ci file. A static function is titled with the name of its file, which is taken off."""
+    """Who calls whom, of a .ci file."""
     calls: dict[str, list[str]] = {}
     for source, callee in re.findall(r'edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"', text):
-        calls.setdefault(source.rsplit(":", 1)[-1], []).append(callee.rsplit(":", 1)[-1])
+        calls.setdefault(_function(source), []).append(_function(callee))
     return calls
 
 
