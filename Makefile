@@ -99,6 +99,11 @@ mutate: setup-dev ## Every mutation of the bridge's supervision, each to be caug
 	$(call say,mutations of hil/bridge/src/supervision.c)
 	@$(BIN)/python hil/bridge/tests/mutate.py $(ARGS)
 
+.PHONY: fuzz
+fuzz: setup-dev ## libFuzzer on the decoder and the bridge, SECONDS=300 each; what it learns stays in build/fuzz
+	$(call say,libFuzzer)
+	@GUSTFORM_FUZZ_SECONDS=$(or $(SECONDS),300) $(BIN)/python -m pytest -p no:cacheprovider tests/fuzz $(ARGS)
+
 .PHONY: bench
 bench: setup-dev ## Speed as ratios against a bare program and against CasADi
 	@$(BIN)/python -m tests.bench $(ARGS)

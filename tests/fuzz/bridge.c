@@ -1,0 +1,194 @@
+/* libFuzzer on the bridge with an exported controller behind it: any sequence of frames, echoes, errors and
+ * ticks. Whatever comes, each frame that it sends is one of its message set with every value in range, and
+ * references are enabled in RUN only.
+ *
+ * A few quiet periods lead out of INIT and SAFE here, so that short inputs get there.
+ *
+ * Input: one byte of options, then records. The low bits of a record's first byte say what it is: a tick, a
+ * frame of the message set under a good CRC and the next counter, any frame, a report of the transport. */
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "e2e.h"
+#include "gustform_bridge/bridge.h"
+#include "gustform_bridge/loop_transport.h"
+
+extern const gust_controller GUST_FUZZ_CONTROLLER;
+
+enum { BRIDGE, LISTENER, PERIOD = 1000000, FRAME = 20000, MESSAGES = 64, QUIET = 3 };
+
+typedef struct reader {
+    const uint8_t *next;
+    size_t left;
+} reader;
+
+typedef struct stand {
+    gust_bus bus;
+    gust_bridge bridge;
+    uint8_t counter[MESSAGES];
+    bool synchronous;
+} stand;
+
+int LLVMFuzzerTestOneInput(const uint8_t *input, size_t size);
+
+static void check(bool good)
+{
+    if (!good)
+        abort();
+}
+
+static uint8_t take(reader *r)
+{
+    if (r->left == 0)
+        return 0;
+    r->left--;
+    return *r->next++;
+}
+
+static void take_bytes(reader *r, uint8_t *bytes, size_t n)
+{
+    for (size_t k = 0; k < n; k++)
+        bytes[k] = take(r);
+}
+
+/* What the bridge has sent. */
+static void listen(stand *s)
+{
+    gust_transport *const transport = &s->bus.node[LISTENER].transport;
+    gust_frame frame;
+
+    while (transport->receive(transport, &frame) == GUST_TRANSPORT_OK) {
+        const gust_message *message = NULL;
+        double values[GUST_MESSAGE_SIGNALS];
+        uint8_t counter = 0;
+        if ((frame.flags & GUST_FRAME_ERROR) != 0)
+            continue;
+        check(gust_message_decode(&gust_messages, &frame, &message, values, &counter) == GUST_DECODED);
+        const int enable = gust_message_signal(message, GUST_FIELD_ENABLE, NULL);
+        if (message->part == GUST_PART_REFERENCES && enable >= 0 && values[enable] != 0.0)
+            check(s->bridge.supervision.state == GUST_STATE_RUN);
+    }
+}
+
+static void tick(stand *s, uint32_t periods)
+{
+    gust_bridge_tick(&s->bridge, periods);
+    gust_bus_run(&s->bus, s->bus.now + (uint64_t)periods * PERIOD);
+    listen(s);
+}
+
+static void hear(stand *s, const gust_frame *frame)
+{
+    if (gust_bridge_receive(&s->bridge, frame) && s->synchronous)
+        tick(s, s->bridge.sync_periods);
+}
+
+/* The bus gives the bridge what is under way to it: its own echoes. */
+static void drain(stand *s)
+{
+    gust_transport *const transport = &s->bus.node[BRIDGE].transport;
+    gust_frame frame;
+
+    while (transport->receive(transport, &frame) == GUST_TRANSPORT_OK)
+        hear(s, &frame);
+}
+
+static void good_frame(stand *s, reader *r, uint8_t op)
+{
+    const size_t number = take(r) % gust_messages.n_messages;
+    const gust_message *const message = &gust_messages.messages[number];
+    gust_frame frame = {
+        .time = s->bus.now, .id = message->id, .flags = message->flags, .length = message->length};
+
+    take_bytes(r, frame.data, message->length);
+    s->counter[number] = (uint8_t)(s->counter[number] + ((op & 0x80U) != 0 ? op >> 4 & 7U : 1U));
+    gust_e2e_protect(&message->e2e, frame.data, frame.length, s->counter[number]);
+    hear(s, &frame);
+}
+
+static void any_frame(stand *s, reader *r)
+{
+    gust_frame frame = {.time = s->bus.now, .flags = take(r) & 0x1FU};
+
+    take_bytes(r, (uint8_t *)&frame.id, sizeof frame.id);
+    frame.length = take(r) % (GUST_FRAME_DATA + 1);
+    take_bytes(r, frame.data, frame.length);
+    hear(s, &frame);
+}
+
+static void report(stand *s, uint8_t op)
+{
+    static const gust_transport_status statuses[] = {GUST_TRANSPORT_OK, GUST_TRANSPORT_FULL,
+                                                     GUST_TRANSPORT_DOWN, GUST_TRANSPORT_FAILED};
+
+    switch (op >> 2 & 7U) {
+    case 0:
+        gust_bus_off(&s->bus.node[BRIDGE]);
+        break;
+    case 1:
+        gust_bus_restart(&s->bus.node[BRIDGE]);
+        break;
+    case 2:
+        s->bus.held = !s->bus.held;
+        break;
+    case 3:
+        gust_bridge_latch(&s->bridge, 1U << (op >> 5));
+        break;
+    case 4:
+        s->bus.node[BRIDGE].full += op >> 5;
+        break;
+    case 5:
+        gust_bridge_stop(&s->bridge);
+        break;
+    default:
+        gust_bridge_transport(&s->bridge, statuses[op >> 5 & 3U]);
+        break;
+    }
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *input, size_t size)
+{
+    static stand s; /* large; as new each time */
+    reader r = {input, size};
+    const uint8_t options = take(&r);
+
+    memset(&s, 0, sizeof s);
+    gust_bus_init(&s.bus, FRAME);
+    s.synchronous = (options & 1U) != 0;
+    gust_bridge_config config = {.controller = &GUST_FUZZ_CONTROLLER,
+                                 .messages = &gust_messages,
+                                 .transport = &s.bus.node[BRIDGE].transport,
+                                 .rates = gust_default_rates,
+                                 .n_rates = gust_n_default_rates,
+                                 .synchronous = s.synchronous,
+                                 .tune = (options & 2U) != 0,
+                                 .age = PERIOD};
+    gust_limits_default(&config.limits);
+    config.limits.heartbeat = 0;
+    config.limits.quiet = QUIET;
+    gust_error error = {.text = ""};
+    check(gust_bridge_init(&s.bridge, &config, &error));
+    while (r.left > 0) {
+        const uint8_t op = take(&r);
+        drain(&s);
+        switch (op & 3U) {
+        case 0:
+            tick(&s, 1U + (op >> 2 & 3U));
+            break;
+        case 1:
+            good_frame(&s, &r, op);
+            break;
+        case 2:
+            any_frame(&s, &r);
+            break;
+        default:
+            report(&s, op);
+            break;
+        }
+    }
+    if (getenv("GUST_FUZZ_TELL") != NULL)
+        (void)printf("state %d\n", (int)s.bridge.supervision.state);
+    return 0;
+}
