@@ -89,16 +89,10 @@ class Bench:
         return self.measured
 
     def _await(self) -> References | None:
-        """The references of this period, and whatever else the bridge has sent by then."""
-        import time
-
-        deadline = time.monotonic() + self.patience
-        while (left := deadline - time.monotonic()) > 0.0:
-            found = self.client.receive(left)
+        """The references of this period; what else has come in before them is taken note of."""
+        while (found := self.client.receive(self.patience)) is not None:
             references = self.client.references(found)
             if references is not None:
-                for other in self.client.drain():  # a state that has changed is told right behind
-                    self.client.references(other)
                 return references
         if self.check is not None:
             self.check()
@@ -151,6 +145,7 @@ class Bench:
         """From wherever it is to RUN: reset if need be, then start."""
         if self.state is None:
             self.ticks(2)
+            self.converter.introduce()  # the first time, the bridge may not have been there
         if self.state == State.SAFE:
             self.reset()
         if self.state != State.RUN:

@@ -233,18 +233,21 @@ class Converter:
 
     def cyclic(self) -> None:
         """State, heartbeat and fingerprint, when it is their time."""
-        client = self.client
         if self.due(Part.CONVERTER_FINGERPRINT):
             self.introduce()
-        if self.due(Part.CONVERTER_HEARTBEAT):
-            client.send(Part.CONVERTER_HEARTBEAT, {"uptime": int(self._ticks * self.period)})
+        elif self.due(Part.CONVERTER_HEARTBEAT):
+            self.client.send(Part.CONVERTER_HEARTBEAT, {"uptime": int(self._ticks * self.period)})
         if self.due(Part.CONVERTER_STATE):
-            client.send(Part.CONVERTER_STATE, {"state": self.state})
+            self.client.send(Part.CONVERTER_STATE, {"state": self.state})
 
     def introduce(self) -> None:
-        """The fingerprint, as after a start."""
-        if self.client.codec.messages.find(Part.CONVERTER_FINGERPRINT) is not None:
-            self.client.send(Part.CONVERTER_FINGERPRINT, {"fingerprint": self.fingerprint})
+        """As after a start: a sign of life, and which database this side has."""
+        for part, values in (
+            (Part.CONVERTER_HEARTBEAT, {"uptime": int(self._ticks * self.period)}),
+            (Part.CONVERTER_FINGERPRINT, {"fingerprint": self.fingerprint}),
+        ):
+            if part in self._every:
+                self.client.send(part, values)
 
     def announce(self, state: ConverterState) -> None:
         """A new state, told at once."""

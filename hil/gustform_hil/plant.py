@@ -91,6 +91,8 @@ class BusPlant:
                 return answer
             state = self.client.heard.state
             if state != told:
+                if told is None:
+                    self.converter.introduce()  # the first time, the bridge may not have been there
                 told = state
                 self._say(_told(state, self.client.heard.faults, self._start))
             if self._start and state == State.READY and (pressed := pressed - 1) < 0:

@@ -15,7 +15,7 @@ from typing import Any, Self
 
 from gustform.language.errors import GustformError
 
-_PATIENCE = 10.0  # s for a program to end after SIGTERM
+_PATIENCE = 10.0  # s for a program to begin, and to end after SIGTERM
 
 
 class Bridge:
@@ -29,6 +29,7 @@ class Bridge:
         command = [str(program), "--interface", interface, "--clock", clock, *options]
         self.events: list[dict[str, Any]] = []
         self.words: list[str] = []  # on stderr
+        self._begun = threading.Event()
         try:
             self._process = subprocess.Popen(
                 command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
@@ -45,6 +46,10 @@ class Bridge:
         ]
         for reader in self._readers:
             reader.start()
+        if not self._begun.wait(_PATIENCE):  # it then listens to the bus
+            self.stop()
+            raise GustformError("GF8076", f"gust-bridge has not begun within {_PATIENCE:g} s", hint="a free interface")
+        self.check()
 
     def _listen(self) -> None:
         assert self._process.stdout is not None
@@ -56,6 +61,8 @@ class Bridge:
                 continue
             if isinstance(found, dict):
                 self.events.append(found)
+                self._begun.set()
+        self._begun.set()
 
     def _overhear(self) -> None:
         assert self._process.stderr is not None
