@@ -43,11 +43,10 @@ bool gust_bind(const gust_message_set *set, const gust_controller_signal *signal
             found = find(set, parts[p], signals[k].name, &places[k]);
         }
         if (!found) {
-            return gust_fail(
-                error,
-                "GF8050: no message of the database %s has the %s '%s' of the controller. Map a signal to "
-                "this quantity in mapping.yaml",
-                set->name, role, signals[k].name);
+            return gust_fail(error,
+                             "GF8050: no message of the database %s has the %s '%s'. Map a signal to "
+                             "this quantity in mapping.yaml",
+                             set->name, role, signals[k].name);
         }
     }
     return true;
