@@ -88,11 +88,14 @@ test-python: setup-dev ## Python tests on all cores; ARGS=... goes to pytest
 	$(call say,Python tests)
 	@$(BIN)/python -m pytest -n auto --ignore=tests/hil/vcan $(ARGS)
 
-# The guest of the runner has one processor, so these tests run one after the other.
+# The guest of the runner has one processor: these tests run one after the other, and their rigs are made outside.
 .PHONY: test-hil
 test-hil: setup-dev ## Tests on a real vcan: this kernel's, else one in user-mode Linux; ARGS=... goes to pytest
+	$(call say,rigs for the tests on a CAN bus)
+	@printf '%s\n' fd classic | $(QUIETLY) build/rigs.log xargs -P 2 -I@ \
+		$(BIN)/gustform hil build $(DEMO_SCENARIO) --bus @ --out build/rigs/@
 	$(call say,tests on a CAN bus)
-	@$(BIN)/python hil/vcan/with-vcan $(BIN)/python -m pytest -p no:cacheprovider tests/hil/vcan $(ARGS)
+	@GUSTFORM_RIGS=$(CURDIR)/build/rigs $(BIN)/python hil/vcan/with-vcan $(BIN)/python -m pytest -p no:cacheprovider tests/hil/vcan $(ARGS)
 
 .PHONY: mutate
 mutate: setup-dev ## Every mutation of the bridge's supervision, each to be caught by its unit tests
@@ -102,7 +105,7 @@ mutate: setup-dev ## Every mutation of the bridge's supervision, each to be caug
 .PHONY: fuzz
 fuzz: setup-dev ## libFuzzer on the decoder and the bridge, SECONDS=300 each; what it learns stays in build/fuzz
 	$(call say,libFuzzer)
-	@GUSTFORM_FUZZ_SECONDS=$(or $(SECONDS),300) $(BIN)/python -m pytest -p no:cacheprovider tests/fuzz $(ARGS)
+	@GUSTFORM_FUZZ_SECONDS=$(or $(SECONDS),300) $(BIN)/python -m pytest -p no:cacheprovider --timeout=0 tests/fuzz $(ARGS)
 
 .PHONY: bench
 bench: setup-dev ## Speed as ratios against a bare program and against CasADi
