@@ -1,6 +1,7 @@
 """What was on the bus, in a file: candump's text (.log) or ASAM MDF 4 (.mf4), by python-can's writers and readers.
 
-Text is written as it comes and is whole whenever a run ends. MF4 is written at the end, from a temporary file.
+Text is written as it comes and is whole whenever a run ends. MF4 takes a tenth of a millisecond for each frame, so what
+comes is kept in memory and written at the end: for long runs, text.
 
 GF8074 the file cannot be written   GF8075 the file cannot be read
 """
@@ -48,10 +49,14 @@ class Log:
                 "GF8074", f"the log {str(file)!r} cannot be written; {error.strerror or error}", hint="another file"
             ) from None
         self.file, self.frames = file, 0
+        self._kept: list[Any] | None = [] if file.suffix.lower() == ".mf4" else None
 
     def __call__(self, message: can.Message) -> None:
-        self._writer(message)
         self.frames += 1
+        if self._kept is not None:
+            self._kept.append(message)
+        else:
+            self._writer(message)
 
     def __enter__(self) -> Self:
         return self
@@ -62,8 +67,15 @@ class Log:
         self.close()
 
     def close(self) -> None:
-        """Write what is left."""
-        self._writer.stop()
+        """Write what is left. GF8074."""
+        try:
+            for message in self._kept or ():
+                self._writer(message)
+            self._writer.stop()
+        except OSError as error:
+            raise GustformError(
+                "GF8074", f"the log {str(self.file)!r} cannot be written; {error.strerror or error}", hint="more space"
+            ) from None
 
 
 def read_log(file: Path) -> Iterator[can.Message]:

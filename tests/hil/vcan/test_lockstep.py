@@ -1,0 +1,212 @@
+"""The plant on the bus, sample by sample, against the simulation that runs the same C beside its equations."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from gustform_cli.hil.compare import compare
+from gustform_cli.hil.plant import message_set, plant
+from gustform_cli.hil.rigs import SCENARIO
+from gustform_cli.interrupt import Interrupt
+from gustform_cli.run_data import RunData
+from gustform_cli.simulate import Outcome, simulate
+from gustform_hil.bus import Bus
+from gustform_hil.client import Client, Operator
+from gustform_hil.codec import Codec
+from gustform_hil.process import Bridge
+from gustform_hil.rig_files import RigFiles
+from gustform_hil.trace import read_trace
+
+STEPS = 20_000
+SAMPLED = ["wt.control.sampled=1ms", "wt.control.delay=1"]
+FLOAT32 = 2.0**-24  # relative: half a unit in the last place
+
+
+def settings(seconds: float, every: str) -> list[str]:
+    """The load step within the run, all channels in double precision."""
+    at = min(5.0, 0.5 * seconds)
+    return [f"run.until={seconds}s", f"events.0.at={at}s", f"output.every={every}", "output.precision=float64"]
+
+
+@dataclass(frozen=True)
+class OnTheBus:
+    outcome: Outcome
+    log: Path | None
+    told: list[dict[str, object]]
+    seconds: float
+
+
+def on_the_bus(
+    rig: RigFiles, interface: str, folder: Path, overrides: list[str], log: Path | None = None, bus: str = "fd"
+) -> OnTheBus:
+    with Bridge(rig.bridge, interface, "sync") as bridge:
+        begin = time.perf_counter()
+        outcome = plant(
+            SCENARIO,
+            folder,
+            overrides,
+            Interrupt(),
+            message_set(bus, None, None),
+            interface,
+            log=log,
+            start=True,
+            figure=False,
+        )
+        seconds = time.perf_counter() - begin
+    return OnTheBus(outcome, log, bridge.events, seconds)
+
+
+def same_bits(one: Path, other: Path) -> int:
+    """Numbers that are there, all of them the same in both files."""
+    count = 0
+    with h5py.File(one) as a, h5py.File(other) as b:
+        names = [name for name, node in a.items() if isinstance(node, h5py.Dataset)]
+        assert names == [name for name, node in b.items() if isinstance(node, h5py.Dataset)]
+        for name in names:
+            assert a[name].dtype == np.float64, name
+            assert a[name][()].tobytes() == b[name][()].tobytes(), name
+            count += a[name].size
+    return count
+
+
+def test_twenty_thousand_steps_have_the_bits_of_the_simulation(rig: RigFiles, interface: str, tmp_path: Path) -> None:
+    overrides = settings(STEPS * 1e-3, "1ms")
+    there = on_the_bus(rig, interface, tmp_path / "bus", overrides)
+    assert there.outcome.error is None
+    here = simulate(SCENARIO, tmp_path / "here", [*overrides, *SAMPLED], Interrupt(), figure=False)
+    assert same_bits(there.outcome.result, here.result) > 50 * STEPS  # 50 channels and more, a row each sample
+    end = there.told[-1]
+    assert (end["event"], end["steps"], end["held"], end["missed"]) == ("end", STEPS, 0, 0)
+    states = [event["state"] for event in there.told if event["event"] == "state"]
+    assert states == ["INIT", "READY", "RUN", "READY"]
+    print(f"{STEPS} steps in {there.seconds:.1f} s, {1e6 * there.seconds / STEPS:.0f} us each")
+
+
+@pytest.fixture(scope="module")
+def logged(rig: RigFiles, interface: str, tmp_path_factory: pytest.TempPathFactory) -> OnTheBus:
+    folder = tmp_path_factory.mktemp("logged")
+    return on_the_bus(rig, interface, folder, settings(1.0, "1ms"), folder / "bus.log")
+
+
+def test_a_log_is_the_simulation(logged: OnTheBus) -> None:
+    assert logged.log is not None
+    trace = read_trace(logged.log, Codec(message_set("fd", None, None)))
+    with RunData(logged.outcome.result, every_row=True) as run:
+        found = compare(trace, run, "wt")
+    assert (found.lost, found.damaged, found.missing) == (0, 0, ())
+    names = {pair.compared.quantity for pair in found.pairs}
+    assert {
+        "v_dc",
+        "omega_r",
+        "P_pmsg",
+        "Q_gsc",
+        "Q_msc",
+        "omega_gsc",
+        "V_gsc",
+        "omega_msc",
+        "V_msc",
+        "beta_ref",
+    } <= names
+    for pair in found.pairs:
+        assert len(pair.time) >= 998  # of a thousand samples
+        if pair.compared.quantity in trace.references:
+            assert pair.compared.largest == 0.0, pair.compared  # a float32, held
+        else:
+            assert pair.compared.largest <= FLOAT32 * np.max(np.abs(pair.simulated)), pair.compared
+
+
+def test_candump_of_can_utils_writes_the_same(rig: RigFiles, interface: str, tmp_path: Path) -> None:
+    """The log of somebody else on the bus, in candump's format, gives the same curves."""
+    with (tmp_path / "candump.log").open("wb") as file:
+        other = subprocess.Popen(["candump", "-L", "-r", str(4 << 20), interface], stdout=file)
+        try:
+            time.sleep(1.0)
+            done = on_the_bus(rig, interface, tmp_path, settings(0.3, "1ms"), tmp_path / "own.log")
+            time.sleep(0.5)
+        finally:
+            other.terminate()
+            other.wait()
+    assert done.outcome.error is None
+    codec = Codec(message_set("fd", None, None))
+    own, others = (read_trace(tmp_path / name, codec) for name in ("own.log", "candump.log"))
+    assert own.measurements.keys() == others.measurements.keys()
+    assert (own.lost, others.lost) == (0, 0)
+    for mine, theirs in ((own.references, others.references), (own.measurements, others.measurements)):
+        for name, series in mine.items():
+            assert np.array_equal(series.sample, theirs[name].sample), name
+            assert np.array_equal(series.values, theirs[name].values), name
+
+
+def test_an_mf4_log_of_a_classic_bus(rig_for: object, interface: str, tmp_path: Path) -> None:
+    assert callable(rig_for)
+    # The classic set has periods of 2 ms; a result of every sample is compared within its quantisation.
+    overrides = settings(0.1, "2ms")
+    done = on_the_bus(rig_for("classic"), interface, tmp_path, overrides, tmp_path / "bus.mf4", bus="classic")
+    assert done.outcome.error is None
+    codec = Codec(message_set("classic", None, None))
+    trace = read_trace(tmp_path / "bus.mf4", codec)
+    half = {s.quantity: 0.51 * s.scale for m in codec.messages.messages for s in m.signals if s.quantity}
+    with RunData(done.outcome.result, every_row=True) as run:
+        found = compare(trace, run, "wt", [f"{name}={half[name]}" for name in (*trace.measurements, *trace.references)])
+    assert found.good, [pair.compared for pair in found.pairs if not pair.compared.good]
+
+
+@pytest.fixture
+def running(rig: RigFiles, interface: str, tmp_path: Path) -> Iterator[tuple[subprocess.Popen[str], Bridge]]:
+    """The command in a process of its own, and the bridge in RUN."""
+    command = [sys.executable, "-m", "gustform_cli", "hil", "plant", str(SCENARIO), "--interface", interface]
+    command += ["--until", "600s", "--out", str(tmp_path), "--log", str(tmp_path / "bus.log"), "--start", "--no-figure"]
+    with Bridge(rig.bridge, interface, "sync") as bridge:
+        process = subprocess.Popen(command, text=True, stderr=subprocess.PIPE, stdout=subprocess.PIPE, env=os.environ)
+        try:
+            deadline = time.monotonic() + 120.0
+            while not any(event.get("state") == "RUN" for event in bridge.events):
+                assert process.poll() is None
+                assert time.monotonic() < deadline
+                time.sleep(0.1)
+            time.sleep(0.5)
+            yield process, bridge
+        finally:
+            process.kill()
+            process.communicate()
+
+
+def test_interrupted_everything_is_readable_and_nothing_is_commanded(
+    running: tuple[subprocess.Popen[str], Bridge], tmp_path: Path
+) -> None:
+    process, bridge = running
+    process.send_signal(signal.SIGINT)
+    output, words = process.communicate(timeout=60)
+    assert process.returncode == 130, words
+    assert "interrupted" in output
+    with RunData(tmp_path / "result.nc") as run:
+        assert run.attribute("status") == "interrupted"
+    trace = read_trace(tmp_path / "bus.log", Codec(message_set("fd", None, None)))
+    assert trace.start is not None
+    assert (trace.lost, trace.damaged) == (0, 0)
+    assert [event["state"] for event in bridge.events if event["event"] == "state"][-1] in ("READY", "SAFE")
+
+
+def test_an_emergency_stop_ends_the_run_with_what_the_bridge_told(
+    running: tuple[subprocess.Popen[str], Bridge], interface: str, tmp_path: Path
+) -> None:
+    process, _ = running
+    with Bus(interface) as bus:
+        Operator(Client(bus, Codec(message_set("fd", None, None)))).emergency_stop()
+    _, words = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert "GF8079" in words
+    assert "EMERGENCY_STOP" in words
+    with RunData(tmp_path / "result.nc") as run:
+        assert run.attribute("status") == "failed"
