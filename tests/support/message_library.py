@@ -81,6 +81,7 @@ int shim_decode(const gust_frame *frame, int *number, double *values, uint8_t *c
 uint32_t shim_encode(int number, const double *values, uint8_t counter, gust_frame *frame);
 uint8_t shim_ahead(int number, uint8_t last, uint8_t counter);
 int shim_find(int part, uint8_t piece);
+const char *shim_unit(int number, int signal);
 void shim_flips(const gust_frame *frame, uint64_t result[4]);
 void shim_codes(const gust_frame *frame, int byte, uint32_t result[65536]);
 int shim_decode(const gust_frame *frame, int *number, double *values, uint8_t *counter)
@@ -102,6 +103,10 @@ int shim_find(int part, uint8_t piece)
 {
     const gust_message *message = gust_message_find(&gust_messages, (gust_part)part, piece);
     return message == NULL ? -1 : (int)(message - gust_messages.messages);
+}
+const char *shim_unit(int number, int signal)
+{
+    return gust_messages.messages[number].signals[signal].unit;
 }
 static gust_decoded decode(const gust_frame *frame, double *values)
 {
