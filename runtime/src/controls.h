@@ -48,6 +48,10 @@ gust_status gust_controls_start(gust_controls *controls, gust_system *system, do
 /* Next time at which a block has to be stepped or changed, s. */
 double gust_controls_next(const gust_controls *controls);
 
+/* The share of the tolerances that a step may take: every sample begins anew, at order one and with an error of
+ * its own, and these add up. 1 without blocks. */
+double gust_controls_share(const gust_controls *controls);
+
 /* Makes the changes and the steps due at t, where y, yp and the inputs hold; commands wait in the blocks. *any
  * is set if there is one. */
 gust_status gust_controls_step(gust_controls *controls, gust_system *system, double t, const double *y,

@@ -235,17 +235,32 @@ gust_status gust_sim_sampled_statistics(gust_sim *sim, int32_t block, gust_sampl
 
 /* -- run ------------------------------------------------------------------------------------------------ */
 
+/* Below this a tolerance is about round-off. */
+static const double FINEST = 1e-11;
+
+static void set_tolerances(gust_sim *sim)
+{
+    const double rtol = sim->options.rtol;
+    const double share = gust_controls_share(&sim->controls);
+    sim->solving = sim->options;
+    if (share < 1.0 && rtol > FINEST) {
+        sim->solving.rtol = fmax(share * rtol, FINEST);
+        sim->solving.atol *= sim->solving.rtol / rtol;
+    }
+}
+
 static gust_status prepare(gust_sim *sim, double t0)
 {
     char *message = sim->message;
     const size_t size = sizeof sim->message;
     const gust_model *model = sim->model;
+    set_tolerances(sim);
     gust_status status = gust_events_create(&sim->events, &sim->system, sim->options.kinks > 0.0);
     if (status == GUST_OK) {
-        status = gust_solver_create(&sim->solver, &sim->system, &sim->events, &sim->options, message, size);
+        status = gust_solver_create(&sim->solver, &sim->system, &sim->events, &sim->solving, message, size);
     }
     if (status == GUST_OK) {
-        status = gust_initial_create(&sim->initial, &sim->system, &sim->options, sim->solver.symbolic,
+        status = gust_initial_create(&sim->initial, &sim->system, &sim->solving, sim->solver.symbolic,
                                      &sim->solver.common);
     }
     if (status == GUST_OK) {

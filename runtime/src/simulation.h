@@ -25,7 +25,8 @@ struct gust_sim {
     const gust_model *model;
     gust_phase phase;
     gust_status ended_with;
-    gust_options options;
+    gust_options options; /* as set */
+    gust_options solving; /* with the tolerances that the solver works to */
     gust_system system;
     gust_sampler sampler;
     gust_controls controls;
