@@ -6,6 +6,7 @@ What it learns is kept in build/fuzz/<target>; seeds are frames of the message s
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import struct
 import subprocess
@@ -28,7 +29,6 @@ BUILD = HERE.parent.parent / "build" / "fuzz"
 SECONDS = int(os.environ.get("GUSTFORM_FUZZ_SECONDS", "10"))
 SANITIZERS = ["-fsanitize=fuzzer,address,undefined,float-cast-overflow", "-fno-sanitize-recover=all"]
 PLANTED = 20  # s, at most, for what a fuzzer that works finds in less than one
-CORE = ("bind", "bridge", "link", "parameters", "sample", "supervision", "transport_loop")
 
 
 def build(messages: MessageSet, target: str, folder: Path, *more: str) -> Path:
@@ -140,12 +140,24 @@ def bridge_seeds(messages: MessageSet, folder: Path, program: Path) -> None:
             assert f"state {state}" in done.stdout, f"{seed.name} does not get where it should"
 
 
+def core() -> list[Path]:
+    """The sources of the bridge that know no operating system, as its CMakeLists.txt names them."""
+    found = re.search(r"set\(GUST_BRIDGE_CORE ([a-z0-9_ ]+)\)", (bridge_folder() / "CMakeLists.txt").read_text())
+    assert found
+    others = set(found[1].split()) - {"e2e", "messages"}  # those come with the message set
+    return [bridge_folder() / "src" / f"{name}.c" for name in sorted(others)]
+
+
 def bridge_program(messages: MessageSet, folder: Path, *more: str) -> Path:
     """The bridge's core around the exported dual-port control, in float as on a microcontroller."""
     controller = folder / "controller"
     write_folder(program_of("DualPort"), PREFIX, False, controller)
-    extra = [str(bridge_folder() / "src" / f"{name}.c") for name in CORE]
-    extra += [str(controller / f"{PREFIX}.c"), str(controller / f"{PREFIX}_interface.c"), f"-I{controller}"]
+    extra = [
+        *map(str, core()),
+        str(controller / f"{PREFIX}.c"),
+        str(controller / f"{PREFIX}_interface.c"),
+        f"-I{controller}",
+    ]
     return build(messages, "bridge", folder, f"-DGUST_FUZZ_CONTROLLER={PREFIX}_controller", *extra, *more)
 
 
