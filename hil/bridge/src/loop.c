@@ -35,8 +35,7 @@ static void tell_changes(gust_loop *loop, gust_state *state, uint32_t *faults)
 static void tick(gust_loop *loop, uint32_t periods, uint64_t since)
 {
     gust_bridge_tick(loop->bridge, periods);
-    const uint64_t taken = (gust_clock_now() - since) / NS_PER_US;
-    ++loop->response[taken < GUST_LOOP_BUCKETS ? taken : GUST_LOOP_BUCKETS - 1U];
+    gust_times_add(&loop->response, gust_clock_now() - since);
     ++loop->periods;
     loop->missed += periods - 1U;
 }
@@ -121,20 +120,4 @@ void gust_loop_run(gust_loop *loop)
         run_monotonic(loop);
     }
     gust_bridge_stop(loop->bridge);
-}
-
-uint32_t gust_loop_quantile(const gust_loop *loop, double share)
-{
-    uint64_t all = 0;
-    for (uint32_t k = 0; k < GUST_LOOP_BUCKETS; ++k) {
-        all += loop->response[k];
-    }
-    uint64_t below = 0;
-    for (uint32_t k = 0; k < GUST_LOOP_BUCKETS; ++k) {
-        below += loop->response[k];
-        if ((double)below >= share * (double)all) {
-            return k;
-        }
-    }
-    return GUST_LOOP_BUCKETS - 1U;
 }

@@ -19,6 +19,7 @@
 #include "gustform_bridge/clock.h"
 #include "gustform_bridge/loop.h"
 #include "gustform_bridge/options.h"
+#include "gustform_bridge/plant_program.h"
 #include "gustform_bridge/report.h"
 #include "gustform_bridge/socketcan.h"
 #include "gustform_bridge/watchdog.h"
@@ -211,6 +212,17 @@ static int run(program *p, int n, char **arguments)
     if (p->options.help) {
         (void)fputs(gust_usage, stdout);
         return EXIT_SUCCESS;
+    }
+    if (p->options.plant) {
+#ifdef GUST_BRIDGE_PLANT
+        return gust_plant_program(&p->options, &gust_messages);
+#else
+        (void)gust_fail(
+            &error,
+            "GF8056: this gust-bridge has no plant. Build it with -DGUST_BRIDGE_PLANT=ON and libgustform, "
+            "or take: gustform hil plant");
+        return fail(&error, EXIT_USAGE);
+#endif
     }
     if (!start(p, &error)) {
         return fail(&error, EXIT_FAILURE);

@@ -7,6 +7,7 @@
 
 #define SHARE_MEDIAN 0.5
 #define SHARE_P99    0.99
+#define NS_PER_US    UINT64_C(1000)
 
 typedef struct line {
     char text[GUST_REPORT];
@@ -91,6 +92,13 @@ static void add_counts(line *l, const gust_counts *counts)
     add(l, "}");
 }
 
+static void add_times(line *l, const gust_times *times)
+{
+    add(l, ", \"response_us\": {\"median\": %" PRIu32 ", \"p99\": %" PRIu32 ", \"max\": %" PRIu64 "}",
+        gust_times_quantile(times, SHARE_MEDIAN), gust_times_quantile(times, SHARE_P99),
+        times->longest / NS_PER_US);
+}
+
 void gust_report_statistics(FILE *file, const char *event, const gust_loop *loop)
 {
     const gust_bridge *bridge = loop->bridge;
@@ -100,8 +108,7 @@ void gust_report_statistics(FILE *file, const char *event, const gust_loop *loop
     add(&l, ", \"periods\": %" PRIu64 ", \"missed\": %" PRIu64 ", \"latest_ns\": %" PRIu64, loop->periods,
         loop->missed, loop->latest);
     add(&l, ", \"steps\": %" PRIu64 ", \"held\": %" PRIu64, bridge->steps, bridge->held);
-    add(&l, ", \"response_us\": {\"median\": %" PRIu32 ", \"p99\": %" PRIu32 "}",
-        gust_loop_quantile(loop, SHARE_MEDIAN), gust_loop_quantile(loop, SHARE_P99));
+    add_times(&l, &loop->response);
     if (loop->watchdog != NULL) {
         add(&l, ", \"watchdog\": {\"fired\": %" PRIu64 ", \"sent\": %" PRIu64 "}",
             atomic_load(&loop->watchdog->fired), atomic_load(&loop->watchdog->sent));

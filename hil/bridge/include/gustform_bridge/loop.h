@@ -12,11 +12,11 @@
 #include <stdint.h>
 
 #include "bridge.h"
+#include "times.h"
 #include "transport.h"
 #include "watchdog.h"
 
-#define GUST_LOOP_EVENTS  256
-#define GUST_LOOP_BUCKETS 4096 /* of the response times, 1 us each; the last holds all that are longer */
+#define GUST_LOOP_EVENTS 256
 
 typedef struct gust_event {
     uint64_t time; /* ns of CLOCK_MONOTONIC */
@@ -37,16 +37,12 @@ typedef struct gust_loop {
     _Atomic uint64_t n_events;
     /* Read after the loop has ended, or as a rough picture before. */
     uint64_t periods, missed;
-    uint64_t latest;                      /* longest lateness of a tick after its deadline, ns */
-    uint64_t drained;                     /* largest number of frames in one period */
-    uint32_t response[GUST_LOOP_BUCKETS]; /* from the frame that began a tick to its references; monotonic: from
-                                             the deadline */
+    uint64_t latest;     /* longest lateness of a tick after its deadline, ns */
+    uint64_t drained;    /* largest number of frames in one period */
+    gust_times response; /* from the frame that began a tick to its references; monotonic: from the deadline */
 } gust_loop;
 
 /* Until `stop`; then SAFE references are sent. */
 void gust_loop_run(gust_loop *loop);
-
-/* The response time that a share of all periods keeps, us. */
-uint32_t gust_loop_quantile(const gust_loop *loop, double share);
 
 #endif
