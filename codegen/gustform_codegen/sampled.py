@@ -32,6 +32,9 @@ from gustform_codegen.table import Sampled, SampledTable
 
 _CONTROL, _PITCH, _SCHEDULE = "control", "pitch", "schedule"
 
+# What a control says of samples, in the order in which it can be taken back.
+_CONTINUOUS: dict[str, Any] = {"delay": 0, "real": "float", "sampled": 0.0}
+
 # Programs made by this process: structure, period and numbers -> program.
 _programs: dict[Hashable, Program] = {}
 
@@ -56,12 +59,16 @@ def continuous(system: System) -> System:
     made: dict[int, Component] = {}
     for component in system.components.values():
         if id(component) not in made:
-            made[id(component)] = (
-                component.with_value(f"{_CONTROL}.sampled", 0.0) if is_sampled(component) else component
-            )
+            made[id(component)] = _in_the_equations(component) if is_sampled(component) else component
     if all(made[id(component)] is component for component in system.components.values()):
         return system
     return replace(system, components={name: made[id(component)] for name, component in system.components.items()})
+
+
+def _in_the_equations(component: Component) -> Component:
+    for name, value in _CONTINUOUS.items():
+        component = component.with_value(f"{_CONTROL}.{name}", value)
+    return component
 
 
 @dataclass(frozen=True, eq=False)

@@ -205,9 +205,9 @@ double gust_controls_next(const gust_controls *controls)
     return next;
 }
 
-/* What a step is without samples, s, on the systems this is for. With the tolerances in proportion to the time between
- * two samples, the errors over some time stay what rtol is known for: measured on the load step at 1 kHz and rtol 1e-6,
- * 0.008 mHz in the frequency instead of 0.24 mHz, for 1.4 times the time. */
+/* What a step is without samples, s, on the systems this is for. With the tolerances in proportion to the time
+ * between two samples, the errors over some time stay what rtol is known for: measured on the load step at 1
+ * kHz and rtol 1e-6, 0.008 mHz in the frequency instead of 0.24 mHz, for 1.4 times the time. */
 static const double STEP_WITHOUT_SAMPLES = 0.1;
 
 double gust_controls_share(const gust_controls *controls)

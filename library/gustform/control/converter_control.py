@@ -74,6 +74,12 @@ class ConverterControl(Component):
             raise GustformError(
                 "GF2003", f"{type(self).__name__}.delay must be 0 or 1 (whole samples); got {delay!r}", hint="1"
             )
+        if sampled == 0.0 and delay == 1:
+            raise GustformError(
+                "GF2003",
+                f"{type(self).__name__}.delay must be 0 where the control is continuous (whole samples); got {delay!r}",
+                hint="sampled: 1 ms",
+            )
 
     def held(self) -> tuple[str, ...]:
         return tuple(self.declared(Output)) if self.sampled > 0.0 else ()

@@ -147,6 +147,17 @@ def test_instances_share_a_library(cache: KernelCache) -> None:
     assert np.max(np.abs(y - table.start) / table.nominal) < 1e-5
 
 
+def test_the_twin_is_the_system_without_samples(cache: KernelCache) -> None:
+    """The same types, so that they are flattened once in a process, whatever the samples are like."""
+    plain, twin = paper_system(8.0), paper_system(8.0)
+    plain.components["wt"] = PmsgTurbine(control=DualPort(K_gsc=0.6))
+    twin.components["wt"] = PmsgTurbine(control=DualPort(K_gsc=0.6, sampled=2e-3, delay=1, real="double"))
+    found = build(twin, cache).linked.twin
+    assert found is not None
+    assert [t.unit for t in found.types] == [t.unit for t in build(plain, cache).linked.types]
+    assert found.system.components["wt"].part("control").value("K_gsc") == 0.6
+
+
 def test_systems_without_samples_are_as_they_were(cache: KernelCache) -> None:
     system = paper_system(8.0)
     assert continuous(system) is system
@@ -291,6 +302,7 @@ def test_a_control_that_cannot_be_exported(cache: KernelCache) -> None:
         ({"sampled": 1e-3, "delay": 2}, "delay must be at most 1"),
         ({"sampled": 1e-3, "delay": 0.5}, "delay must be 0 or 1"),
         ({"sampled": 1e-3, "delay": True}, "delay must be 0 or 1"),
+        ({"delay": 1}, "delay must be 0 where the control is continuous"),
         ({"sampled": 1e-3, "real": "half"}, "real must be float or double"),
     ],
 )
