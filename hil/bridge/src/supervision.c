@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#define ERRORS_THAT_COUNT UINT32_C(0xfffffffb)
+#define ERRORS_THAT_COUNT UINT32_C(0xffffffdb)
 
 void gust_limits_default(gust_limits *limits)
 {

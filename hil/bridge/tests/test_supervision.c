@@ -82,7 +82,7 @@ static void defaults(void **unused)
     assert_int_equal(limits.heartbeat, 300);
     assert_int_equal(limits.set_points, 0);
     assert_int_equal(limits.errors, 2);
-    assert_int_equal(limits.error_mask, 0xfffffffb);
+    assert_int_equal(limits.error_mask, 0xffffffdb);
     assert_true(limits.fingerprint);
     for (uint32_t k = 0; k < GUST_SUPERVISED_VALUES; ++k) {
         assert_true(isinf(limits.rate[k]) && limits.rate[k] > 0.0);

@@ -40,7 +40,7 @@ typedef struct gust_limits {
     uint32_t heartbeat;  /* periods without a heartbeat that are tolerated; 0: the database has none [300] */
     uint32_t set_points; /* the same of set-points; 0: the last ones stay for ever [0] */
     uint32_t errors;     /* steps in a row with an error signal that are tolerated [2] */
-    uint32_t error_mask; /* bits of the error signal that count: not 2, an output at its limit [0xfffffffb] */
+    uint32_t error_mask; /* bits that count: not 2, an output at its limit, nor 5, a table [0xffffffdb] */
     bool fingerprint;    /* the converter tells which database it has [true] */
     double rate[GUST_SUPERVISED_VALUES]; /* largest change of a measurement in a period; infinite: any
                                             [infinite] */
