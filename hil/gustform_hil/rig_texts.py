@@ -5,13 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+# Sources of the program itself; what is not there is left out.
+PROGRAM = ("bridge/src/main.c", "bridge/src/plant_model.c", "bridge/src/plant_program.c")
+
 
 def cmake(prefix: str, files: Sequence[str]) -> str:
     """The one CMake file of a rig: controller in C99, everything else in C11. `prefix` is a name in C."""
-    common = [f for f in files if f.endswith(".c") and not f.startswith("bridge/tools/") and f != "bridge/src/main.c"]
-    listed = "\n".join(f"    {name}" for name in common)
+    sources = [f for f in files if f.endswith(".c") and not f.startswith("bridge/tools/")]
+    listed = "\n".join(f"    {name}" for name in sources if name not in PROGRAM)
+    program = " ".join(name for name in PROGRAM if name in sources)
     return f"""# cmake -S . -B build && cmake --build build
-cmake_minimum_required(VERSION 3.16)
+cmake_minimum_required(VERSION 3.18)
 project(gust_rig C)
 
 set(CMAKE_C_STANDARD_REQUIRED ON)
@@ -36,10 +40,21 @@ target_include_directories(bridge PUBLIC bridge/include messages)
 target_compile_definitions(bridge PUBLIC _GNU_SOURCE)
 target_link_libraries(bridge PUBLIC controller Threads::Threads)
 
-add_executable(gust-bridge bridge/src/main.c)
+add_executable(gust-bridge {program})
 set_target_properties(gust-bridge PROPERTIES C_STANDARD 11)
 target_compile_definitions(gust-bridge PRIVATE GUST_BRIDGE_PREFIX={prefix})
 target_link_libraries(gust-bridge PRIVATE bridge)
+
+# --role plant: a simulation in the place of the converter.
+option(GUST_BRIDGE_PLANT "gust-bridge --role plant as well; needs libgustform" OFF)
+set(GUST_BRIDGE_RUNTIME "" CACHE PATH "Folder gustform_runtime with include and lib of libgustform")
+if(GUST_BRIDGE_PLANT)
+    find_path(GUSTFORM_INCLUDE gustform/gust_sim.h HINTS "${{GUST_BRIDGE_RUNTIME}}/include" REQUIRED)
+    find_library(GUSTFORM_LIBRARY gustform HINTS "${{GUST_BRIDGE_RUNTIME}}/lib" REQUIRED)
+    target_compile_definitions(gust-bridge PRIVATE GUST_BRIDGE_PLANT)
+    target_include_directories(gust-bridge SYSTEM PRIVATE "${{GUSTFORM_INCLUDE}}")
+    target_link_libraries(gust-bridge PRIVATE "${{GUSTFORM_LIBRARY}}")
+endif()
 
 # Many frames through a bus, and what became of them.
 add_executable(gust-soak bridge/tools/soak.c)
@@ -64,7 +79,7 @@ cmake --build build
 ./build/gust-bridge --interface can0
 ```
 
-It needs CMake 3.16, a C compiler and Linux with SocketCAN: no Python, no gustform. The folder `build` stays behind
+It needs CMake 3.18, a C compiler and Linux with SocketCAN: no Python, no gustform. The folder `build` stays behind
 when the others are copied to another computer. The interface has to be up, and a bus that went off is not to come
 back by itself:
 
