@@ -13,6 +13,7 @@ DONE, FAILED, USAGE, INTERRUPTED = 0, 1, 2, 130
 # Codes of what the caller can mend on the command line or in the scenario: the exit code is then 2.
 _USAGE_CODES = (
     *("GF2", "GF7001", "GF7002", "GF7003", "GF7006", "GF7007", "GF7008"),
+    *("GF8071", "GF8072", "GF8074", "GF8075", "GF8081", "GF8083", "GF8084", "GF8085"),
     *("GF800", "GF801", "GF802", "GF8120", "GF8123", "GF8124", "GF8130", "GF8131", "GF8132", "GF8135"),
 )
 

@@ -109,7 +109,7 @@ class _Collector:
         enabled = {sample: values.pop("enable", 0.0) == 1.0 for sample, values in self._answered.items()}
         start = min((sample for sample, on in enabled.items() if on), default=None)
         end = min((s for s, on in enabled.items() if not on and start is not None and s > start), default=None)
-        within = range(0 if start is None else start, max(enabled, default=-1) + 1 if end is None else end)
+        within = range(0) if start is None else range(start, max(enabled) + 1 if end is None else end)
         measured = {sample: values for sample, values in self._measured.items() if sample in within}
         commanded = {sample: values for sample, values in self._answered.items() if sample in within}
         complete = max((len(values) for values in measured.values()), default=0)
@@ -124,7 +124,7 @@ class _Collector:
             frozenset(idle),
             start,
             self._syncs,
-            0 if start is None else len(within) - len(whole),
+            len(within) - len(whole),
             self._damaged,
         )
 

@@ -2,9 +2,9 @@
 
 Sample k0, the first that was answered with enabled references, is the result's time zero. A measurement is compared at
 the result's times, between samples on the line between them. A command holds from sample to sample, and acts as many
-samples late as the result's scenario says; at the instant of a change it is compared with what held just before or just
-after, whichever fits, because the result has one of the two. What the scenario's control neither reads nor commands is
-compared if it ever left the value of least harm, which is sent for what nobody measures.
+samples late as the result's scenario says; a row of the result at the instant of a change has what held before it. What
+the scenario's control neither reads nor commands is compared if it ever left the value of least harm, which is sent for
+what nobody measures.
 
 GF8080 the log has nothing to compare   GF8081 a tolerance that is none
 """
@@ -193,25 +193,20 @@ def _pair(curve: Curve, time: Floats, series: Series, trace: Trace, late: int | 
     assert trace.start is not None
     aside = trace.period * _SAME_TIME
     sampled = (series.sample - trace.start + (late or 0)) * trace.period
-    inside = (time >= sampled[0] - aside) & (time <= sampled[-1] + aside)
-    time, values = time[inside], curve.values[inside]
-    if not len(time):
-        return None
     if late is None:
+        inside = (time >= sampled[0] - aside) & (time <= sampled[-1] + aside)
         logged = np.interp(time, sampled, series.values)
     else:
-        before = series.values[_last_up_to(sampled, time - aside)]
-        after = series.values[_last_up_to(sampled, time + aside)]
-        logged = np.where(np.abs(before - values) < np.abs(after - values), before, after)
+        inside = (time > sampled[0] + aside) & (time <= sampled[-1] + trace.period + aside)
+        logged = series.values[np.maximum(np.searchsorted(sampled, time - aside) - 1, 0)]
+    time, values, logged = time[inside], curve.values[inside], logged[inside]
+    if not len(time):
+        return None
     difference = np.abs(logged - values)
     worst = int(np.argmax(difference))
     largest, at = float(difference[worst]), float(time[worst])
     found = Compared(curve.name, curve.description, curve.unit, len(time), largest, at, math.inf)
     return Pair(found, time, logged, values)
-
-
-def _last_up_to(sampled: NDArray[Any], time: NDArray[Any]) -> NDArray[np.intp]:
-    return np.maximum(np.searchsorted(sampled, time, side="right") - 1, 0)
 
 
 def _judged(pair: Pair, tolerance: float) -> Pair:
