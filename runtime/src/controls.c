@@ -12,7 +12,7 @@
 static bool create_control(gust_control *control, const gust_model *model, const gust_model_sampled *what)
 {
     const size_t commands = (size_t)what->info.n_commands;
-    *control = (gust_control){.what = what};
+    *control = (gust_control){.what = what, .statistics = {.first_error = NAN}};
     if (what->library >= 0) {
         control->controller = model->libraries[what->library].controller;
         control->n_context = ((int64_t)control->controller->context_size + 7) / 8;

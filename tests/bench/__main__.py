@@ -3,7 +3,8 @@
 (a) the turbulent scenario against a bare IDA + KLU program on the same condensed equations;
 (b) the farm against CasADi's `idas`, with and without JIT, for N = 1, 10, 100 turbines, building apart from solving;
 (c) building and time per turbine-step for N = 1, 10, 100, 1000 turbines, and the way from the YAML to the first row;
-(d) a day of 20 Hz wind and a year of measured wind against both, and what statistics, rows, checkpoints, events cost.
+(d) a day of 20 Hz wind and a year of measured wind against both, and what statistics, rows, checkpoints, events cost;
+(e) sampled controls against the continuous one.
 
 Machines are noisy: runs of both sides alternate, the smallest time of each counts.
 """
@@ -26,6 +27,7 @@ from rich.table import Table
 
 from tests.bench.long_runs import long_runs
 from tests.bench.peers import BareProgram, CasadiIdas, NotCompiledError, Wind
+from tests.bench.samples import samples
 from tests.support.case import SCENARIOS, Case, open_case
 
 _RTOL = 1e-6
@@ -230,7 +232,7 @@ def scaling(counts: list[int], seconds: dict[int, float]) -> dict[str, Any]:
 def main() -> None:
     """Run the benchmarks named, all by default."""
     parser = argparse.ArgumentParser(prog="make bench ARGS=...", description=__doc__.splitlines()[0] if __doc__ else "")
-    parser.add_argument("parts", nargs="*", default=["a", "b", "c", "d"], help="a, b, c, d (default: all)")
+    parser.add_argument("parts", nargs="*", default=["a", "b", "c", "d", "e"], help="a ... e (default: all)")
     parser.add_argument("--hours", type=float, default=1.0, help="simulated hours of (a)")
     parser.add_argument("--days", type=float, default=1.0, help="simulated days of (d)")
     parser.add_argument("--repeats", type=int, default=5)
@@ -250,6 +252,8 @@ def main() -> None:
             figures["scaling"] = scaling([1, 10, 100, 1000], {1: 600.0, 10: 600.0, 100: 60.0, 1000: 20.0})
         if "d" in arguments.parts:
             figures["long_runs"] = long_runs(min(arguments.repeats, 3), Path(folder), arguments.days)
+        if "e" in arguments.parts:
+            figures["samples"] = samples(arguments.repeats)
     if arguments.json:
         arguments.json.write_text(json.dumps(figures, indent=2) + "\n")
 
