@@ -200,7 +200,7 @@ $(VENV_STAMPS)/venv: | $(BUILD_STAMPS)/system
 $(VENV_STAMPS)/base: pyproject.toml tools/constraints.txt $(VENV_STAMPS)/venv
 	$(call say,Python packages (about a minute the first time))
 	@$(PIP_INSTALL) scikit-build-core
-	@$(PIP_INSTALL) --no-build-isolation --editable .
+	@$(PIP_INSTALL) --no-build-isolation --editable '.[hil]'
 	@touch $@
 
 $(VENV_STAMPS)/dev: $(VENV_STAMPS)/base | $(BUILD_STAMPS)/system-tests
