@@ -137,5 +137,34 @@ def build(
         print(builder.as_json(built) if json else builder.as_text(built))
 
 
+class Button(StrEnum):
+    """What an operator can press, and a look without pressing."""
+
+    start = "start"
+    stop = "stop"
+    reset = "reset"
+    emergency_stop = "emergency-stop"
+    status = "status"
+
+
+@hil.command()
+def operate(
+    button: Annotated[Button, typer.Argument(help="what to press; status only looks")],
+    interface: Annotated[str, typer.Option(metavar="NAME", help="SocketCAN interface")] = "vcan0",
+    bus: Annotated[Bus, typer.Option(help="which of the shipped databases")] = Bus.fd,
+    dbc: Annotated[Path | None, typer.Option(metavar="FILE", help="a database of your own, with --mapping")] = None,
+    mapping: Annotated[Path | None, typer.Option(metavar="FILE", help="what its messages mean")] = None,
+    patience: Annotated[float, typer.Option(metavar="S", min=0.1, max=60.0, help="how long to wait")] = 2.0,
+    json: Json = False,
+) -> None:
+    """Press a button of the operator and tell which state follows; 1 if the bridge does not follow."""
+    with guarded():
+        from gustform_cli.hil import operate as buttons
+        from gustform_cli.hil.plant import message_set
+
+        state, faults = buttons.operate(button.value, interface, message_set(bus.value, dbc, mapping), patience)
+        print(buttons.as_json(state, faults) if json else buttons.as_text(state, faults))
+
+
 for command in COMMANDS:
     hil.command()(command)
