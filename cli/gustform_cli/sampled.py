@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from gustform_codegen.emit.controller.c_files import ERRORS
+from gustform_codegen.emit.controller.c_header import ERRORS
 
 if TYPE_CHECKING:
     from gustform_runtime import Simulation

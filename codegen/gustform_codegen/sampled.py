@@ -21,12 +21,14 @@ from gustform.language.system import System
 from gustform.turbines.pmsg_turbine import PmsgTurbine
 from gustform_codegen.cache import KernelCache
 from gustform_codegen.emit.controller.a2l import offsets
-from gustform_codegen.emit.controller.block import Block, Signal, controller_block
-from gustform_codegen.emit.controller.c_files import Names, header, source
+from gustform_codegen.emit.controller.block import Block, controller_block
+from gustform_codegen.emit.controller.c_header import Names, header
+from gustform_codegen.emit.controller.c_source import source
 from gustform_codegen.emit.controller.discretise import discretise
 from gustform_codegen.emit.controller.folder import default_prefix
 from gustform_codegen.emit.controller.interface import common_header, interface_header, interface_source
 from gustform_codegen.emit.controller.program import Program, program
+from gustform_codegen.emit.controller.signals import Signal
 from gustform_codegen.link import Linked, LinkedType
 from gustform_codegen.table import Sampled, SampledTable
 

@@ -14,7 +14,7 @@ import pytest
 
 from gustform.language.errors import GustformError
 from gustform.language.table import TableData
-from gustform_codegen.emit.controller.c_files import ERRORS
+from gustform_codegen.emit.controller.c_header import ERRORS
 from gustform_codegen.emit.controller.description import stable_id
 from gustform_codegen.emit.controller.discretise import Method
 from gustform_codegen.emit.controller.folder import WARNINGS, default_prefix, files, write_folder

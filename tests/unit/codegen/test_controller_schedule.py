@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from gustform_codegen.emit.controller.discretise import Method, discretise
 from gustform_codegen.emit.controller.frequency import frequency_response
 from gustform_codegen.emit.controller.look_up import spline_at
 from gustform_codegen.emit.controller.program import Evaluator, program
-from tests.support.controller import PERIOD, block_of
+from tests.support.controller import PERIOD, Compiled, block_of
 
 MEASURED, ESTIMATED = "DualPort+measured", "DualPort+estimated"
 
@@ -122,6 +123,30 @@ def test_frequency_responses_go_through_the_tables() -> None:
     assert q.error(50.0) < 1e-4
     observed = {(q.input, q.output): q for q in frequency_response(discretise(block_of(ESTIMATED), PERIOD))}
     assert max(q.error(200.0) for q in observed.values()) < 4e-2
+
+
+class Looking(ConverterControl):
+    curve = Table("pu", "pu", "pu", "a table")
+
+    def equations(self) -> None:
+        self.eq(self.omega_gsc, table2(self.curve, 2.0 * table2(self.curve, self.v_dc, 0.5 * self.v_dc), self.v_dc))
+
+
+@pytest.mark.parametrize("double", [False, True])
+def test_a_control_may_look_up_what_it_has_looked_up(double: bool, tmp_path: Path) -> None:
+    table = bowl()
+    one = Compiled(program(discretise(block_of(Looking(curve=table)), PERIOD)), tmp_path, double)
+    block = one.program.step.block
+    inputs = np.tile([s.value for s in block.inputs], (500, 1))
+    v = np.linspace(0.0, 2.0, 500)
+    inputs[:, [s.name for s in block.inputs].index("v_dc")] = v
+    out, _, errors = one.run(inputs)
+    inner = 2.0 * table.evaluate(v, 0.5 * v)[0]
+    expected = np.clip(table.evaluate(inner, v)[0], 0.5, 1.5)  # the range of omega_gsc
+    np.testing.assert_allclose(out[:, 0], expected, rtol=0.0, atol=1e-10 if double else 1e-6)
+    beyond = inner > 2.0001  # a thousandth of a step counts as round-off
+    np.testing.assert_array_equal((errors & 32) != 0, beyond)
+    assert beyond.any()
 
 
 class Together(ConverterControl):

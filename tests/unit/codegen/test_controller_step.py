@@ -12,7 +12,7 @@ import pytest
 from scipy.signal import cont2discrete
 
 from gustform.control.converter_control import ConverterControl
-from gustform.language import Input, Parameter, Table, Variable, limit, table2
+from gustform.language import Input, Parameter, Variable, limit
 from gustform.language.errors import GustformError
 from gustform.turbines.pmsg_turbine import PmsgTurbine
 from gustform_codegen.emit.controller.block import Block, controller_block
@@ -170,13 +170,6 @@ def test_found_values_are_the_defaults() -> None:
     block = controller_block(turbine.control, turbine.pitch, found)
     assert next(p.value for p in block.parameters if p.name == "gsc_Q_ref") == 0.25
     assert next(s.value for s in block.states if s.name == "pitch_P_filtered") == 0.4
-
-
-class Looking(ConverterControl):
-    curve = Table("pu", "pu", "pu", "a table")
-
-    def equations(self) -> None:
-        self.eq(self.omega_gsc, table2(self.curve, self.v_dc, self.v_dc))
 
 
 class Unknown(ConverterControl):

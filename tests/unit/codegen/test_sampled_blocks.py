@@ -21,7 +21,8 @@ from gustform.turbines.pmsg_turbine import PmsgTurbine
 from gustform_cli.export import block_of_scenario
 from gustform_codegen.build import build
 from gustform_codegen.cache import KernelCache
-from gustform_codegen.emit.controller.c_files import Names, source
+from gustform_codegen.emit.controller.c_header import Names
+from gustform_codegen.emit.controller.c_source import source
 from gustform_codegen.emit.controller.discretise import discretise
 from gustform_codegen.emit.controller.interface import HEADER
 from gustform_codegen.emit.controller.program import Evaluator, program

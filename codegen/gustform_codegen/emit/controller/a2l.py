@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 
-from gustform_codegen.emit.controller.block import Signal
-from gustform_codegen.emit.controller.c_files import Names
+from gustform_codegen.emit.controller.c_header import Names
 from gustform_codegen.emit.controller.program import Program
+from gustform_codegen.emit.controller.signals import Signal
 
 _LARGEST = {4: 3.4e38, 8: 1.7e308}
 

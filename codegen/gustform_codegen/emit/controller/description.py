@@ -8,9 +8,9 @@ import zlib
 from typing import Any
 
 from gustform.language.errors import GustformError
-from gustform_codegen.emit.controller.block import Signal
-from gustform_codegen.emit.controller.c_files import Names, errors_of
+from gustform_codegen.emit.controller.c_header import Names, errors_of
 from gustform_codegen.emit.controller.program import Program
+from gustform_codegen.emit.controller.signals import Signal
 
 
 def stable_id(kind: str, name: str) -> int:

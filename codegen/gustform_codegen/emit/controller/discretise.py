@@ -42,8 +42,9 @@ import numpy as np
 
 from gustform.language.errors import GustformError
 from gustform.language.operators import limit
-from gustform_codegen.emit.controller.block import Block, Signal
+from gustform_codegen.emit.controller.block import Block
 from gustform_codegen.emit.controller.look_up import Evaluations, expanded, slope_of
+from gustform_codegen.emit.controller.signals import Signal
 from gustform_codegen.symbolic import Substitution, key_of, keys_in, solve_for, solve_linear
 from gustform_codegen.unit_type import Call
 

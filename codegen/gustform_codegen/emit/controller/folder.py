@@ -8,12 +8,13 @@ from pathlib import Path
 
 from gustform.language.errors import GustformError
 from gustform_codegen.emit.controller.a2l import a2l
-from gustform_codegen.emit.controller.block import Signal
-from gustform_codegen.emit.controller.c_files import Names, errors_of, header, source
+from gustform_codegen.emit.controller.c_header import Names, errors_of, header
+from gustform_codegen.emit.controller.c_source import source
 from gustform_codegen.emit.controller.description import as_json
 from gustform_codegen.emit.controller.host_test import host_test, vectors_header
 from gustform_codegen.emit.controller.interface import common_header, interface_header, interface_source
 from gustform_codegen.emit.controller.program import Program
+from gustform_codegen.emit.controller.signals import Signal
 from gustform_codegen.emit.controller.vectors import recorded
 
 SAMPLES = 400  # of the recorded vectors

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gustform_codegen.emit.controller.c_files import Names
+from gustform_codegen.emit.controller.c_header import Names
 from gustform_codegen.emit.controller.program import Program
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gustform_codegen.emit.controller.block import Signal
-from gustform_codegen.emit.controller.c_files import Names
+from gustform_codegen.emit.controller.c_header import Names
 from gustform_codegen.emit.controller.description import stable_id
 from gustform_codegen.emit.controller.program import Program
+from gustform_codegen.emit.controller.signals import Signal
 
 HEADER = Path(__file__).with_name("gust_controller.h")
 _CALLS = ("startup", "step", "recalibrate", "reinitialise")
