@@ -23,6 +23,7 @@ from gustform_hil.client import (
 )
 from gustform_hil.message_set import Field, Part, Signal
 
+PATIENCE = 10.0  # s of wall time for an answer: longer than any pause of this computer
 QUIET = 20  # periods without a fault before the bridge may leave INIT or SAFE; gust_limits
 _MOST = 400  # periods to wait for a state
 _CLOSE = 1e-6  # float32, relative
@@ -45,7 +46,7 @@ class Bench:
         measurements: Values,
         set_points: Values,
         check: Callable[[], None] | None = None,
-        patience: float = 2.0,
+        patience: float = PATIENCE,
     ) -> None:
         self.client = client
         self.converter = Converter(client)

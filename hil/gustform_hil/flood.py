@@ -4,7 +4,7 @@ Band 0 passes sockets of a high priority (this bench), band 1 holds all others b
 then gets ENOBUFS, as from a bus that is busier than its queue is long. The kernel is asked over rtnetlink, as tc does:
 
     tc qdisc replace dev IF root handle 1: prio bands 3 priomap 1 1 1 1 1 1 0 0 1 1 1 1 1 1 1 1
-    tc qdisc add dev IF parent 1:2 handle 20: netem delay 200ms limit 16
+    tc qdisc add dev IF parent 1:2 handle 20: netem delay 5s limit 16
 
 GF8078 the queue cannot be attached
 """
@@ -34,8 +34,9 @@ _ROOT, _PRIO, _HELD_BAND, _NETEM = 0xFFFF_FFFF, 0x1_0000, 0x1_0002, 0x20_0000
 class Flood:
     """A context: the queue is attached and full when it begins, and gone when it ends."""
 
-    def __init__(self, bus: Bus, delay: float = 0.2, frames: int = 16) -> None:
-        """`bus`: of the bench; what it sends passes. `delay`: how long frames are held back, s."""
+    def __init__(self, bus: Bus, delay: float = 5.0, frames: int = 16) -> None:
+        """`bus`: of the bench; what it sends passes. `delay`: how long frames are held back, s. It is longer than any
+        pause of this computer, or the queue would empty by itself; what is in it at the end is thrown away."""
         self._bus, self._delay, self._frames = bus, delay, frames
 
     def __enter__(self) -> Self:

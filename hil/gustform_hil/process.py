@@ -15,6 +15,8 @@ from typing import Any, Self
 
 from gustform.language.errors import GustformError
 
+# On the sync clock time is counted in Syncs, and a pause of this computer is none of the bus.
+UNHURRIED = ("--patience", "20000", "--watchdog", "20000")
 _PATIENCE = 10.0  # s for a program to begin, and to end after SIGTERM
 
 

@@ -8,20 +8,24 @@ from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
 
+from gustform.language.errors import GustformError
 from gustform_cli.hil.rigs import rig_of
 from gustform_hil.bench import Bench
 from gustform_hil.bus import Bus
 from gustform_hil.client import Client
 from gustform_hil.codec import Codec
 from gustform_hil.faults import LIMIT, Outcome, faults, inject, wrong_from_the_start
-from gustform_hil.process import Bridge
+from gustform_hil.process import UNHURRIED, Bridge
 from gustform_hil.rig_files import RigFiles
+
+_TRIES = 20  # of all faults together, in real time
 
 
 @contextmanager
 def bench_of(rig: RigFiles, interface: str, clock: str = "sync") -> Iterator[Bench]:
     """A bench with the rig's bridge, which ends with it."""
-    with Bus(interface, fd=rig.fd) as bus, Bridge(rig.bridge, interface, clock) as bridge:
+    options = UNHURRIED if clock == "sync" else ()
+    with Bus(interface, fd=rig.fd) as bus, Bridge(rig.bridge, interface, clock, options) as bridge:
         yield Bench(Client(bus, Codec(rig.messages)), rig.measurements, rig.set_points, bridge.check)
 
 
@@ -29,13 +33,33 @@ def run(interface: str, rig: Path | None, *, monotonic: bool = False) -> list[Ou
     """All of them, one after the other into the same bridge. `monotonic`: at the pace of this computer's clock; the
     times are then wall times."""
     with rig_of(rig) as found:
-        with bench_of(found, interface, "monotonic" if monotonic else "sync") as bench:
-            outcomes = [inject(bench, fault) for fault in faults(bench)]
         if monotonic:
-            return [replace(one, to_safe_ms=one.wall_ms) for one in outcomes]
+            return _in_real_time(found, interface)
+        with bench_of(found, interface) as bench:
+            outcomes = [inject(bench, fault) for fault in faults(bench)]
         with bench_of(found, interface) as bench:
             never = wrong_from_the_start(bench)
     return [replace(o, violations=o.violations + never) if o.fault == "wrong_fingerprint" else o for o in outcomes]
+
+
+def _in_real_time(rig: RigFiles, interface: str) -> list[Outcome]:
+    """Each fault into a bridge of its own, again where Python was too slow to keep it running. GF8077."""
+    done: list[Outcome] = []
+    slow = 0
+    while True:
+        with bench_of(rig, interface, "monotonic") as bench:
+            twelve = faults(bench)
+            if len(done) == len(twelve):
+                return done
+            try:
+                outcome = inject(bench, twelve[len(done)])
+            except GustformError as error:
+                slow += 1
+                if error.code != "GF8077" or slow > _TRIES:
+                    hint = "a computer, or an hour, in which Python sends a period's frames within a millisecond"
+                    raise GustformError(error.code, error.message, hint=hint) from None
+                continue
+        done.append(replace(outcome, to_safe_ms=outcome.wall_ms))
 
 
 def good(outcomes: list[Outcome]) -> bool:

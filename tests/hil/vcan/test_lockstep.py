@@ -24,7 +24,7 @@ from gustform_cli.simulate import Outcome, simulate
 from gustform_hil.bus import Bus
 from gustform_hil.client import Client, Operator
 from gustform_hil.codec import Codec
-from gustform_hil.process import Bridge
+from gustform_hil.process import UNHURRIED, Bridge
 from gustform_hil.rig_files import RigFiles
 from gustform_hil.trace import read_trace
 
@@ -50,7 +50,7 @@ class OnTheBus:
 def on_the_bus(
     rig: RigFiles, interface: str, folder: Path, overrides: list[str], log: Path | None = None, bus: str = "fd"
 ) -> OnTheBus:
-    with Bridge(rig.bridge, interface, "sync") as bridge:
+    with Bridge(rig.bridge, interface, "sync", UNHURRIED) as bridge:
         begin = time.perf_counter()
         outcome = plant(
             SCENARIO,
@@ -167,7 +167,7 @@ def running(rig: RigFiles, interface: str, tmp_path: Path) -> Iterator[tuple[sub
     """The command in a process of its own, and the bridge in RUN."""
     command = [sys.executable, "-m", "gustform_cli", "hil", "plant", str(SCENARIO), "--interface", interface]
     command += ["--until", "600s", "--out", str(tmp_path), "--log", str(tmp_path / "bus.log"), "--start", "--no-figure"]
-    with Bridge(rig.bridge, interface, "sync") as bridge:
+    with Bridge(rig.bridge, interface, "sync", UNHURRIED) as bridge:
         process = subprocess.Popen(command, text=True, stderr=subprocess.PIPE, stdout=subprocess.PIPE, env=os.environ)
         try:
             deadline = time.monotonic() + 120.0

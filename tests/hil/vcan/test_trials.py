@@ -7,7 +7,7 @@ from collections import Counter
 from contextlib import ExitStack
 
 from gustform_cli.hil.faults import bench_of
-from gustform_hil.bench import Bench, Tick
+from gustform_hil.bench import PATIENCE, Bench, Tick
 from gustform_hil.bus import BUS_OFF
 from gustform_hil.client import Command, State
 from gustform_hil.faults import SILENCE, fault_names
@@ -49,7 +49,7 @@ def _trial(bench: Bench, chance: random.Random, kind: str) -> None:
         _current(bench, bench.tick(send), enabled=False)
         for _ in range(chance.randrange(1, 4)):
             _current(bench, bench.tick(), enabled=False)
-    bench.patience = 2.0
+    bench.patience = PATIENCE
     for _ in range(2):
         _current(bench, bench.tick(), enabled=False)  # what a full queue held back would come now
     bench.until(State.SAFE, STATE_CYCLE)  # its word on it was lost where the queue was full; nothing is sent twice
