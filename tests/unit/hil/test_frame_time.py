@@ -33,6 +33,12 @@ def test_bits_of_classic_frames() -> None:
         assert frame_bits(length, fd=False).data == 0
 
 
+def test_the_crc_grows_above_16_bytes() -> None:
+    # ESI, DLC, data, stuff bits, then the stuff count and a CRC of 17 or 21 bits with 6 or 7 fixed stuff bits.
+    assert frame_bits(16, fd=True).data == 1 + 4 + 128 + 33 + 4 + 17 + 6
+    assert frame_bits(20, fd=True).data == 1 + 4 + 160 + 41 + 4 + 21 + 7
+
+
 @pytest.mark.parametrize(("fd", "length"), [(False, 9), (False, -1), (True, 9), (True, 65)])
 def test_a_length_that_no_frame_has(fd: bool, length: int) -> None:
     with pytest.raises(ValueError, match=r"no .* frame has"):
