@@ -346,6 +346,10 @@ static void send_or_wait(gust_bridge *bridge)
 {
     if (bridge->link.under_way > 0) {
         gust_transport *transport = bridge->config.transport;
+        /* After a late tick the next one comes sooner than a period; then there is nothing wrong yet. */
+        if (!bridge->config.synchronous && bridge->begun - bridge->handed < bridge->link.period * 3U / 4U) {
+            return;
+        }
         gust_supervision_raise(&bridge->supervision, GUST_FAULT_SEND);
         transport->flush(transport);
         ++bridge->stuck;
@@ -355,6 +359,7 @@ static void send_or_wait(gust_bridge *bridge)
         bridge->link.under_way = 0;
     }
     bridge->stuck = 0;
+    bridge->handed = bridge->begun;
     send_references(bridge);
 }
 

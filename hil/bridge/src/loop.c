@@ -47,23 +47,29 @@ static void serve(gust_loop *loop)
     }
 }
 
-/* Everything that has come in, up to a Sync if there is one to stop at. true: stopped at it, at `*at`. */
-static bool drain(gust_loop *loop, bool stop_at_sync, uint64_t *at)
+/* Everything that has come in, up to a Sync if `periods` is not NULL, to which the periods until it are added.
+ *
+ * While references are under way a Sync is passed over: what follows it in the queue may be their echo. So a
+ * loop that comes late makes one tick of the Syncs that have piled up, and no burst. */
+static void drain(gust_loop *loop, uint32_t *periods, uint64_t *since)
 {
     gust_frame frame;
     for (uint32_t n = 0; n < FRAMES_PER_PERIOD; ++n) {
         const gust_transport_status status = loop->transport->receive(loop->transport, &frame);
         if (status != GUST_TRANSPORT_OK) {
             gust_bridge_transport(loop->bridge, status);
-            return false;
+            return;
         }
         loop->drained = n + 1U > loop->drained ? n + 1U : loop->drained;
-        if (gust_bridge_receive(loop->bridge, &frame) && stop_at_sync) {
-            *at = frame.time;
-            return true;
+        if (!gust_bridge_receive(loop->bridge, &frame) || periods == NULL) {
+            continue;
+        }
+        *since = *periods == 0 ? frame.time : *since;
+        *periods += loop->bridge->sync_periods;
+        if (loop->bridge->link.under_way == 0) {
+            return;
         }
     }
-    return false;
 }
 
 static void run_monotonic(gust_loop *loop)
@@ -78,8 +84,7 @@ static void run_monotonic(gust_loop *loop)
         const uint64_t late = gust_clock_now() - deadline;
         loop->latest = late > loop->latest ? late : loop->latest;
         periods = 1U + (uint32_t)(late / period);
-        uint64_t unused = 0;
-        (void)drain(loop, false, &unused);
+        drain(loop, NULL, NULL);
         tick(loop, periods, deadline);
         serve(loop);
         tell_changes(loop, &state, &faults);
@@ -87,25 +92,33 @@ static void run_monotonic(gust_loop *loop)
     }
 }
 
+static uint64_t sooner(uint64_t a, uint64_t b)
+{
+    return a < b ? a : b;
+}
+
+/* A period ends with its Sync when the references before it have left, or have had a period's time to. */
 static void run_synchronous(gust_loop *loop)
 {
     gust_state state = GUST_STATE_SAFE;
     uint32_t faults = 0;
-    uint64_t limit = gust_clock_now() + loop->patience;
+    uint32_t periods = 0;
+    uint64_t since = 0;
+    uint64_t ticked = gust_clock_now();
     while (!atomic_load(&loop->stop)) {
-        uint64_t since = 0;
-        const bool synced = drain(loop, true, &since);
+        drain(loop, &periods, &since);
         const uint64_t now = gust_clock_now();
-        if (synced) {
-            tick(loop, loop->bridge->sync_periods, since);
+        const uint64_t left = ticked + loop->bridge->link.period;
+        const uint64_t limit = ticked + loop->patience;
+        if (periods > 0 && (loop->bridge->link.under_way == 0 || now >= left)) {
+            tick(loop, periods, since);
+            ticked = now;
+            periods = 0;
         } else if (now >= limit) {
             tick(loop, 1, now);
+            ticked = now;
         } else {
-            const uint64_t slice = now + SLICE;
-            (void)loop->transport->wait(loop->transport, slice < limit ? slice : limit);
-        }
-        if (synced || now >= limit) {
-            limit = now + loop->patience;
+            (void)loop->transport->wait(loop->transport, sooner(now + SLICE, periods > 0 ? left : limit));
         }
         serve(loop);
         tell_changes(loop, &state, &faults);

@@ -101,7 +101,9 @@ void gust_plant_send(gust_plant *plant, const double *measurements)
     send_when_due(plant, GUST_PART_CONVERTER_STATE, measurements, plant->state != plant->told);
     plant->told = plant->state;
     send_when_due(plant, GUST_PART_SET_POINTS, measurements, false);
-    send_part(plant, GUST_PART_MEASUREMENTS, measurements);
+    if (!plant->mute) {
+        send_part(plant, GUST_PART_MEASUREMENTS, measurements);
+    }
     send_part(plant, GUST_PART_SYNC, measurements);
 }
 
@@ -116,18 +118,21 @@ static double enable_of(const gust_sample *references)
     return enable;
 }
 
-/* References are complete: whether they answer to this sample. Those to the one before are taken, too. */
+/* References are complete: whether they answer to this sample. Commands for the one before are taken, too. */
 static bool take_references(gust_plant *plant)
 {
     const uint64_t modulus = plant->references.modulus;
     const int32_t behind = modulus == 0 ? 0
                                         : gust_sample_difference((uint32_t)(plant->number % modulus),
                                                                  plant->references.number, modulus);
-    if (behind < 0 || behind > 1) {
+    const bool enabled = enable_of(&plant->references) == 1.0;
+    ++plant->references_taken;
+    /* Whoever does not enable is right, however old the sample. */
+    if (enabled && (behind < 0 || behind > 1)) {
         return false;
     }
     plant->answered = true;
-    plant->enabled = enable_of(&plant->references) == 1.0;
+    plant->enabled = enabled;
     if (plant->enabled && plant->state != GUST_CONVERTER_TRIPPED) {
         plant->state = GUST_CONVERTER_RUNNING;
         for (uint32_t k = 0; k < plant->config.n_commands; ++k) {

@@ -50,7 +50,8 @@ static gust_transport_status send_frame(gust_transport *transport, const gust_fr
     const bool fd = (frame->flags & GUST_FRAME_FD) != 0;
     struct canfd_frame raw;
     memset(&raw, 0, sizeof raw);
-    raw.can_id = frame->id | ((frame->flags & GUST_FRAME_EXTENDED) != 0 ? CAN_EFF_FLAG : 0U);
+    raw.can_id = frame->id | ((frame->flags & GUST_FRAME_EXTENDED) != 0 ? CAN_EFF_FLAG : 0U) |
+                 ((frame->flags & GUST_FRAME_ERROR) != 0 ? CAN_ERR_FLAG : 0U);
     raw.len = frame->length;
     raw.flags = fd ? CANFD_BRS : 0;
     if (frame->length > (fd ? CANFD_MAX_DLEN : CAN_MAX_DLEN)) {

@@ -481,6 +481,13 @@ static void held_bus(void **unused)
     assert_int_equal(stand_state(&s), GUST_STATE_RUN);
     const uint32_t queued = s.bus.node[0].n_queued;
     assert_int_equal(s.bridge.link.under_way, 1);
+    gust_bus_run(&s.bus, s.bus.now + PERIOD_NS / 2);
+    stand_drain(&s);
+    gust_bridge_tick(&s.bridge, 1); /* sooner than a period: not late yet, but nothing is queued behind it */
+    assert_int_equal(stand_state(&s), GUST_STATE_RUN);
+    assert_int_equal(s.bridge.link.under_way, 1);
+    gust_bus_run(&s.bus, s.bus.now + PERIOD_NS / 2);
+    stand_drain(&s);
     gust_bridge_tick(&s.bridge, 1);
     assert_int_equal(stand_state(&s), GUST_STATE_SAFE);
     assert_true(s.bus.node[0].n_queued <= queued + 1U); /* the SAFE references in place of the old ones */

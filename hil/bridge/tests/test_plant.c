@@ -221,6 +221,13 @@ static void stale_commands(void **unused)
             (double[32]){[2] = (double)(plant.number - behind), [3] = 1.0, [4] = 1.25, [6] = 5.0}, &frame);
         assert_int_equal(gust_plant_receive(&plant, &frame), behind == 0);
         assert_true(plant.command[0] == (behind < 2U ? 1.25 : 1.0));
+        /* but one that blocks the converter is, however old */
+        plant.state = GUST_CONVERTER_RUNNING;
+        (void)gust_link_protect(&bridge.link, message,
+                                (double[32]){[2] = (double)(plant.number - behind), [4] = 1.0}, &frame);
+        (void)gust_plant_receive(&plant, &frame);
+        gust_plant_finish(&plant);
+        assert_int_equal(plant.state, GUST_CONVERTER_READY);
     }
 }
 

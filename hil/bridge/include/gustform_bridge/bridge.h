@@ -78,6 +78,7 @@ typedef struct gust_bridge {
     uint64_t ticks;
     uint64_t steps, held; /* periods in RUN with a step, and without */
     uint64_t begun;       /* the tick, ns of the transport's clock */
+    uint64_t handed;      /* the tick whose references were handed over last */
     gust_state told_state;
     uint32_t told_faults;
     _Atomic uint32_t sample; /* number of the last fresh sample */

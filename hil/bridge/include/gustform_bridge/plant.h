@@ -50,6 +50,8 @@ typedef struct gust_plant {
     uint32_t silent;              /* periods without an answer */
     uint32_t resting;             /* periods of references that are not enabled */
     uint64_t ticks, answers, trips;
+    uint64_t references_taken; /* complete samples of them */
+    bool mute;                 /* for tests: measurements are not sent */
     uint32_t told;
 } gust_plant;
 
