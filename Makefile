@@ -78,8 +78,8 @@ lint: check ## The quick checks and clang-tidy
 	@git ls-files -z 'runtime/src/*.c' | xargs -0r -n 1 -P "$$(nproc)" $(BIN)/clang-tidy --quiet -p build/release
 	@git ls-files -z 'hil/bridge/src/*.c' | \
 		xargs -0rI@ -P "$$(nproc)" $(BIN)/clang-tidy --quiet @ -- $(BRIDGE_FLAGS) -D_GNU_SOURCE
-	@git ls-files -z 'hil/vcan/*.c' 'hil/realtime/*.c' | \
-		xargs -0rI@ -P "$$(nproc)" $(BIN)/clang-tidy --quiet @ -- $(BRIDGE_FLAGS)
+	@git ls-files -z 'hil/vcan/*.c' 'hil/realtime/*.c' 'hil/pil/*.c' ':!hil/pil/board.c' | \
+		xargs -0rI@ -P "$$(nproc)" $(BIN)/clang-tidy --quiet @ -- $(BRIDGE_FLAGS) -DCONTROLLER=dual_port_controller
 
 .PHONY: test-c
 test-c: setup-dev ## C tests with AddressSanitizer and UBSan

@@ -5,17 +5,12 @@
  * so on, a Cortex-M4F gives the bits of IEEE 754. Arguments are bit patterns: the run-time ABI passes doubles
  * in core registers.
  */
-#include <stdint.h>
+#include "exact_double.h"
 
 #define SIGN     (UINT64_C(1) << 63)
 #define INFINITE (UINT64_C(0x7FF) << 52)
 #define FRACTION ((UINT64_C(1) << 52) - 1U)
 #define QUIET    (INFINITE | (UINT64_C(1) << 51))
-
-uint64_t exact_add(uint64_t a, uint64_t b);
-uint64_t __wrap___aeabi_dadd(uint64_t a, uint64_t b);
-uint64_t __wrap___aeabi_dsub(uint64_t a, uint64_t b);
-uint64_t __wrap___aeabi_drsub(uint64_t a, uint64_t b);
 
 /* The exponent of a finite number; that of the smallest normal one for all below it. */
 static uint32_t exponent(uint64_t x)

@@ -28,7 +28,7 @@ static unsigned char row[LARGEST_ROW];
 static void write_inputs(const gust_controller *c)
 {
     for (uint32_t k = 0U; k < c->n_inputs; k++) {
-        (void)memcpy((char *)context + c->inputs[k].offset, &row[k * c->real_size], c->real_size);
+        (void)memcpy((char *)context + c->inputs[k].offset, &row[(size_t)k * c->real_size], c->real_size);
     }
 }
 
