@@ -22,6 +22,7 @@ import subprocess
 from collections.abc import Iterator
 from dataclasses import dataclass
 from hashlib import sha256
+from importlib.metadata import version
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -48,7 +49,7 @@ class Rig:
     messages: MessageSet
     database: Path
     mapping: Path
-    origin: dict[str, str]
+    origin: dict[str, Any]
 
     @property
     def description(self) -> dict[str, Any]:
@@ -56,7 +57,11 @@ class Rig:
         block = self.controller.step.block
         return {
             "kind": KIND,
-            "gustform": gustform.__version__,
+            "versions": {
+                "gustform": gustform.__version__,
+                "casadi": version("casadi"),
+                "cantools": version("cantools"),
+            },
             **self.origin,
             "control": block.name,
             "prefix": self.prefix,

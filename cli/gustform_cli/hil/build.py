@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from hashlib import sha256
 from pathlib import Path
 
 from gustform.language.errors import GustformError
@@ -57,7 +58,12 @@ def build(scenario: Path, out: Path, options: Options | None = None) -> Built:
     name = find_turbine(scenario, given.turbine).name
     block = block_of_scenario(name, scenario, given.overrides)
     made = program(discretise(block, seconds))
-    origin = {"scenario": scenario.stem, "turbine": name}
+    origin = {
+        "scenario": scenario.name,
+        "scenario_sha256": sha256(scenario.read_bytes()).hexdigest(),
+        "set": list(given.overrides),
+        "turbine": name,
+    }
     rig = Rig(made, default_prefix(block.name), messages, database, mapping, origin)
     write_rig(rig, out)
     return Built(rig, out, compile_rig(out) if given.compile else None)

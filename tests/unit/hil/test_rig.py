@@ -7,6 +7,7 @@ import os
 import shutil
 import subprocess
 import sys
+from hashlib import sha256
 from pathlib import Path
 
 import pytest
@@ -55,7 +56,7 @@ def test_a_rig_that_was_moved_needs_cmake_and_a_compiler(tmp_path: Path) -> None
     there = tmp_path / "there"
     path = os.pathsep.join(sorted({str(Path(shutil.which(name) or "").parent) for name in ("cmake", "cc", "make")}))
     for arguments in (["-S", str(there), "-B", str(there / "build")], ["--build", str(there / "build")]):
-        done = run(shutil.which("cmake") or "cmake", *arguments, PATH=path)
+        done = run(shutil.which("cmake") or "cmake", *arguments, PATH=path, CMAKE_BUILD_TYPE="Debug")
         assert done.returncode == 0, done.stdout + done.stderr
     assert "--interface" in run(there / "build" / "gust-bridge", "--help").stdout
 
@@ -69,6 +70,7 @@ def test_the_same_bytes_each_time(tmp_path: Path) -> None:
         assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes(), file
     described = json.loads((tmp_path / "a" / "rig.json").read_text())
     assert set(described["files"]) | {"rig.json"} == {file.as_posix() for file in files}
+    assert set(described["versions"]) == {"gustform", "casadi", "cantools"}
     assert described["fingerprint"] == f"0x{rig().messages.fingerprint:08x}"
 
 
@@ -124,12 +126,13 @@ def build(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
 
 
 def test_the_command_takes_the_turbine_of_a_scenario(tmp_path: Path) -> None:
-    done = build(
-        LOAD_STEP, "--out", tmp_path / "rig", "--no-compile", "--json", "--set", "components.wt.control.K_gsc=0.4"
-    )
+    gain = "components.wt.control.K_gsc=0.4"
+    done = build(LOAD_STEP, "--out", tmp_path / "rig", "--no-compile", "--json", "--set", gain)
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout)
     assert (told["control"], told["turbine"], told["period_s"], told["program"]) == ("DualPort", "wt", 1e-3, None)
+    assert told["scenario_sha256"] == sha256(LOAD_STEP.read_bytes()).hexdigest()
+    assert told["set"] == [gain]
     described = json.loads((tmp_path / "rig" / "controller" / "dual_port.json").read_text())
     assert {p["name"]: p["default"] for p in described["parameters"]}["K_gsc"] == 0.4
     # Known before there is a controller: the messages do not fit these rates.
