@@ -5,7 +5,7 @@
     RIG/messages     C made of them
     RIG/bridge       the bridge's own sources
     RIG/rig.json     what it was made from
-    RIG/build        the programs gust-bridge and gust-soak, once compiled
+    RIG/build        the programs gust-bridge, gust-soak and gust-latency, once compiled
 
 The same scenario and versions give the same bytes. A folder that is neither empty nor a rig is never written to; in a
 rig, files of the last build that are no longer part of it are removed, and nothing else.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import PurePosixPath
 from typing import Any
 
 # Sources of the program itself; what is not there is left out.
@@ -14,6 +15,7 @@ def cmake(prefix: str, files: Sequence[str]) -> str:
     sources = [f for f in files if f.endswith(".c") and not f.startswith("bridge/tools/")]
     listed = "\n".join(f"    {name}" for name in sources if name not in PROGRAM)
     program = " ".join(name for name in PROGRAM if name in sources)
+    tools = "\n".join(_tool(name) for name in files if name.startswith("bridge/tools/"))
     return f"""# cmake -S . -B build && cmake --build build
 cmake_minimum_required(VERSION 3.18)
 project(gust_rig C)
@@ -56,10 +58,14 @@ if(GUST_BRIDGE_PLANT)
     target_link_libraries(gust-bridge PRIVATE "${{GUSTFORM_LIBRARY}}")
 endif()
 
-# Many frames through a bus, and what became of them.
-add_executable(gust-soak bridge/tools/soak.c)
-set_target_properties(gust-soak PROPERTIES C_STANDARD 11)
-target_link_libraries(gust-soak PRIVATE bridge)
+{tools}"""
+
+
+def _tool(file: str) -> str:
+    name = f"gust-{PurePosixPath(file).stem}"
+    return f"""add_executable({name} {file})
+set_target_properties({name} PROPERTIES C_STANDARD 11)
+target_link_libraries({name} PRIVATE bridge)
 """
 
 
@@ -93,5 +99,6 @@ fit. `--clock monotonic`, the default, keeps time itself; with `--clock sync` ea
 
 The bridge waits in INIT for the converter and in READY for the operator's start; any fault leads to SAFE, which only
 the operator's reset leaves. What SAFE guarantees and what it does not stands in `hil/README.md` of gustform.
-`build/gust-soak` sends many frames through a bus and counts what became of them.
+`build/gust-soak` sends many frames through a bus and counts what became of them, `build/gust-latency` measures how soon
+a bridge answers and is safe.
 """
