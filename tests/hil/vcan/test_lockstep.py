@@ -6,8 +6,10 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,7 +24,7 @@ from gustform_cli.interrupt import Interrupt
 from gustform_cli.run_data import RunData
 from gustform_cli.simulate import Outcome, simulate
 from gustform_hil.bus import Bus
-from gustform_hil.client import Client, Operator
+from gustform_hil.client import Client, Command, Operator
 from gustform_hil.codec import Codec
 from gustform_hil.process import UNHURRIED, Bridge
 from gustform_hil.rig_files import RigFiles
@@ -30,6 +32,7 @@ from gustform_hil.trace import read_trace
 
 STEPS = 20_000
 SAMPLED = ["wt.control.sampled=1ms", "wt.control.delay=1"]
+PATIENCE = 120.0  # s, for a process that builds its model in a second or two
 FLOAT32 = 2.0**-24  # relative: half a unit in the last place
 
 
@@ -162,32 +165,50 @@ def test_an_mf4_log_of_a_classic_bus(rig_for: object, interface: str, tmp_path: 
     assert found.good, [pair.compared for pair in found.pairs if not pair.compared.good]
 
 
-@pytest.fixture
-def running(rig: RigFiles, interface: str, tmp_path: Path) -> Iterator[tuple[subprocess.Popen[str], Bridge]]:
-    """The command in a process of its own, and the bridge in RUN."""
-    command = [sys.executable, "-m", "gustform_cli", "hil", "plant", str(SCENARIO), "--interface", interface]
-    command += ["--until", "600s", "--out", str(tmp_path), "--log", str(tmp_path / "bus.log"), "--start", "--no-figure"]
-    with Bridge(rig.bridge, interface, "sync", UNHURRIED) as bridge:
-        process = subprocess.Popen(command, text=True, stderr=subprocess.PIPE, stdout=subprocess.PIPE, env=os.environ)
-        try:
-            deadline = time.monotonic() + 120.0
-            while not any(event.get("state") == "RUN" for event in bridge.events):
-                assert process.poll() is None
-                assert time.monotonic() < deadline
-                time.sleep(0.1)
-            time.sleep(0.5)
-            yield process, bridge
-        finally:
-            process.kill()
-            process.communicate()
+@contextmanager
+def when(bridge: Bridge, state: str, action: Callable[[], None]) -> Iterator[None]:
+    """Do something from a thread, half a second after the bridge has come to a state."""
+
+    def watch() -> None:
+        deadline = time.monotonic() + PATIENCE
+        while not any(event.get("state") == state for event in bridge.events):
+            if time.monotonic() > deadline:
+                return
+            time.sleep(0.05)
+        time.sleep(0.5)
+        action()
+
+    thread = threading.Thread(target=watch)
+    thread.start()
+    try:
+        yield
+    finally:
+        thread.join()
 
 
 def test_interrupted_everything_is_readable_and_nothing_is_commanded(
-    running: tuple[subprocess.Popen[str], Bridge], tmp_path: Path
+    rig: RigFiles, interface: str, tmp_path: Path
 ) -> None:
-    process, bridge = running
-    process.send_signal(signal.SIGINT)
-    output, words = process.communicate(timeout=60)
+    """The command in a process of its own; the bridge comes later than the plant."""
+    line = [
+        sys.executable,
+        "-m",
+        "gustform_cli",
+        "hil",
+        "plant",
+        str(SCENARIO),
+        "--interface",
+        interface,
+        "--no-figure",
+    ]
+    line += ["--until", "600s", "--out", str(tmp_path), "--log", str(tmp_path / "bus.log"), "--start"]
+    process = subprocess.Popen(line, text=True, stderr=subprocess.PIPE, stdout=subprocess.PIPE)
+    assert process.stderr is not None
+    assert any("waiting for the bridge" in words for words in process.stderr)
+    with Bridge(rig.bridge, interface, "sync", UNHURRIED) as bridge:
+        with when(bridge, "RUN", lambda: process.send_signal(signal.SIGINT)):
+            output, words = process.communicate(timeout=2.0 * PATIENCE)
+        assert [event["state"] for event in bridge.events if event["event"] == "state"][-1] in ("READY", "SAFE")
     assert process.returncode == 130, words
     assert "interrupted" in output
     with RunData(tmp_path / "result.nc") as run:
@@ -195,18 +216,43 @@ def test_interrupted_everything_is_readable_and_nothing_is_commanded(
     trace = read_trace(tmp_path / "bus.log", Codec(message_set("fd", None, None)))
     assert trace.start is not None
     assert (trace.lost, trace.damaged) == (0, 0)
-    assert [event["state"] for event in bridge.events if event["event"] == "state"][-1] in ("READY", "SAFE")
 
 
-def test_an_emergency_stop_ends_the_run_with_what_the_bridge_told(
-    running: tuple[subprocess.Popen[str], Bridge], interface: str, tmp_path: Path
+def test_the_plant_waits_for_an_operator_and_ends_at_an_emergency_stop(
+    rig: RigFiles, interface: str, tmp_path: Path
 ) -> None:
-    process, _ = running
-    with Bus(interface) as bus:
-        Operator(Client(bus, Codec(message_set("fd", None, None)))).emergency_stop()
-    _, words = process.communicate(timeout=60)
-    assert process.returncode == 1
-    assert "GF8079" in words
-    assert "EMERGENCY_STOP" in words
-    with RunData(tmp_path / "result.nc") as run:
+    messages = message_set("fd", None, None)
+    with Bus(interface) as bus, Bridge(rig.bridge, interface, "sync", UNHURRIED) as bridge:
+        operator = Operator(Client(bus, Codec(messages)))
+        states_at_start: list[object] = []
+
+        def start() -> None:
+            states_at_start.extend(event.get("state") for event in bridge.events)
+            operator.press(Command.START)
+
+        with when(bridge, "READY", start), when(bridge, "RUN", operator.emergency_stop):
+            outcome = plant(
+                SCENARIO, tmp_path, ["run.until=600s"], Interrupt(), messages, interface, start=False, figure=False
+            )
+    assert "RUN" not in states_at_start
+    assert outcome.error is not None
+    assert outcome.error.code == "GF8079"
+    assert "EMERGENCY_STOP" in outcome.error.message
+    with RunData(outcome.result) as run:
         assert run.attribute("status") == "failed"
+    assert bridge.events[-1]["steps"] > 0
+
+
+def test_without_a_bridge_it_can_be_interrupted(interface: str, tmp_path: Path) -> None:
+    def interrupt_what_sends() -> None:
+        if other.receive(PATIENCE) is not None:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    messages = message_set("fd", None, None)
+    with Bus(interface) as other, Interrupt() as interrupt:
+        thread = threading.Thread(target=interrupt_what_sends)
+        thread.start()
+        outcome = plant(SCENARIO, tmp_path, ["run.until=600s"], interrupt, messages, interface, figure=False)
+        thread.join()
+    assert outcome.summary.status == "interrupted"
+    assert outcome.summary.simulated_seconds < 0.01
