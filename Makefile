@@ -107,7 +107,7 @@ mutate: setup-dev ## Every mutation of the bridge's supervision, each to be caug
 	@$(BIN)/python hil/bridge/tests/mutate.py $(ARGS)
 
 .PHONY: fuzz
-fuzz: setup-dev ## libFuzzer on the decoder and the bridge, SECONDS=300 each; what it learns stays in build/fuzz
+fuzz: setup-dev ## libFuzzer on decoder, bridge and converter, SECONDS=300 each; what it learns stays in build/fuzz
 	$(call say,libFuzzer)
 	@GUSTFORM_FUZZ_SECONDS=$(or $(SECONDS),300) $(BIN)/python -m pytest -p no:cacheprovider --timeout=0 tests/fuzz $(ARGS)
 

@@ -6,52 +6,23 @@
  *
  * Input: one byte of options, then records. The low bits of a record's first byte say what it is: a tick, a
  * frame of the message set under a good CRC and the next counter, any frame, a report of the transport. */
-#include <stdbool.h>
 #include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
-#include "e2e.h"
 #include "gustform_bridge/bridge.h"
 #include "gustform_bridge/loop_transport.h"
+#include "records.h"
 
 extern const gust_controller GUST_FUZZ_CONTROLLER;
 
-enum { BRIDGE, LISTENER, PERIOD = 1000000, FRAME = 20000, MESSAGES = 64, QUIET = 3 };
-
-typedef struct reader {
-    const uint8_t *next;
-    size_t left;
-} reader;
+enum { BRIDGE, LISTENER, PERIOD = 1000000, FRAME = 20000, QUIET = 3 };
 
 typedef struct stand {
     gust_bus bus;
     gust_bridge bridge;
-    uint8_t counter[MESSAGES];
     bool synchronous;
 } stand;
 
 int LLVMFuzzerTestOneInput(const uint8_t *input, size_t size);
-
-static void check(bool good)
-{
-    if (!good)
-        abort();
-}
-
-static uint8_t take(reader *r)
-{
-    if (r->left == 0)
-        return 0;
-    r->left--;
-    return *r->next++;
-}
-
-static void take_bytes(reader *r, uint8_t *bytes, size_t n)
-{
-    for (size_t k = 0; k < n; k++)
-        bytes[k] = take(r);
-}
 
 /* What the bridge has sent. */
 static void listen(stand *s)
@@ -79,8 +50,9 @@ static void tick(stand *s, uint32_t periods)
     listen(s);
 }
 
-static void hear(stand *s, const gust_frame *frame)
+static void hear(stand *s, gust_frame *frame)
 {
+    frame->time = s->bus.now;
     if (gust_bridge_receive(&s->bridge, frame) && s->synchronous)
         tick(s, s->bridge.sync_periods);
 }
@@ -93,29 +65,6 @@ static void drain(stand *s)
 
     while (transport->receive(transport, &frame) == GUST_TRANSPORT_OK)
         hear(s, &frame);
-}
-
-static void good_frame(stand *s, reader *r, uint8_t op)
-{
-    const size_t number = take(r) % gust_messages.n_messages;
-    const gust_message *const message = &gust_messages.messages[number];
-    gust_frame frame = {
-        .time = s->bus.now, .id = message->id, .flags = message->flags, .length = message->length};
-
-    take_bytes(r, frame.data, message->length);
-    s->counter[number] = (uint8_t)(s->counter[number] + ((op & 0x80U) != 0 ? op >> 4 & 7U : 1U));
-    gust_e2e_protect(&message->e2e, frame.data, frame.length, s->counter[number]);
-    hear(s, &frame);
-}
-
-static void any_frame(stand *s, reader *r)
-{
-    gust_frame frame = {.time = s->bus.now, .flags = take(r) & 0x1FU};
-
-    take_bytes(r, (uint8_t *)&frame.id, sizeof frame.id);
-    frame.length = take(r) % (GUST_FRAME_DATA + 1);
-    take_bytes(r, frame.data, frame.length);
-    hear(s, &frame);
 }
 
 static void report(stand *s, uint8_t op)
@@ -151,7 +100,7 @@ static void report(stand *s, uint8_t op)
 int LLVMFuzzerTestOneInput(const uint8_t *input, size_t size)
 {
     static stand s; /* large; as new each time */
-    reader r = {input, size};
+    reader r = {.next = input, .left = size};
     const uint8_t options = take(&r);
 
     memset(&s, 0, sizeof s);
@@ -172,16 +121,19 @@ int LLVMFuzzerTestOneInput(const uint8_t *input, size_t size)
     check(gust_bridge_init(&s.bridge, &config, &error));
     while (r.left > 0) {
         const uint8_t op = take(&r);
+        gust_frame frame;
         drain(&s);
         switch (op & 3U) {
         case 0:
             tick(&s, 1U + (op >> 2 & 3U));
             break;
         case 1:
-            good_frame(&s, &r, op);
+            frame = good_frame(&r, op);
+            hear(&s, &frame);
             break;
         case 2:
-            any_frame(&s, &r);
+            frame = any_frame(&r);
+            hear(&s, &frame);
             break;
         default:
             report(&s, op);

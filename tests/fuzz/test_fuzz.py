@@ -1,6 +1,7 @@
-"""libFuzzer under AddressSanitizer and UBSan, on the decoder and on the bridge: a while here, long in `make fuzz`.
+"""libFuzzer under AddressSanitizer and UBSan, on decoder, bridge and converter: a minute here, long in `make fuzz`.
 
-What it learns is kept in build/fuzz/<target>; seeds are frames of the message sets. GUSTFORM_FUZZ_SECONDS: how long.
+What it learns is kept in build/fuzz/<target>; seeds are frames of the message sets. GUSTFORM_FUZZ_SECONDS: how long,
+each of the six targets.
 """
 
 from __future__ import annotations
@@ -86,10 +87,14 @@ class Script:
             number = self.messages.messages.index(message)
             self.data += bytes([1, number]) + self.codec.encode(message, values_of(message, fields), 0)
 
-    def period(self, sample: int) -> None:
-        number = self.messages.pieces(Part.MEASUREMENTS)[0].signal(Field.SAMPLE)
+    def sampled(self, part: Part, sample: int, enable: int = 0) -> None:
+        """A part with a number of a sample, modulo what its bits carry."""
+        number = self.messages.pieces(part)[0].signal(Field.SAMPLE)
         assert number is not None
-        self.send(Part.MEASUREMENTS, {Field.SAMPLE: sample % (number.high + 1)})
+        self.send(part, {Field.SAMPLE: sample % (number.high + 1), Field.ENABLE: enable})
+
+    def period(self, sample: int) -> None:
+        self.sampled(Part.MEASUREMENTS, sample)
         self.send(Part.SYNC, {Field.SAMPLE: sample})
         if self.data[0] & 1 == 0:
             self.data.append(0)
@@ -135,9 +140,33 @@ def bridge_seeds(messages: MessageSet, folder: Path, program: Path) -> None:
         for until, state in (("ready", 1), ("run", 2), ("parameter", 2), ("back", 2)):
             seed = folder / f"{until}_{options}"
             seed.write_bytes(bridge_script(messages, options, until, parameter))
-            tell = {**os.environ, "GUST_FUZZ_TELL": "1"}
-            done = subprocess.run([str(program), str(seed)], capture_output=True, text=True, check=True, env=tell)
-            assert f"state {state}" in done.stdout, f"{seed.name} does not get where it should"
+            assert f"state {state}" in told(program, seed), f"{seed.name} does not get where it should"
+
+
+def told(program: Path, seed: Path) -> str:
+    """What state the end of a seed finds."""
+    tell = {**os.environ, "GUST_FUZZ_TELL": "1"}
+    done = subprocess.run([str(program), str(seed)], capture_output=True, text=True, check=True, env=tell)
+    return done.stdout
+
+
+def plant_seeds(messages: MessageSet, folder: Path, program: Path) -> None:
+    """Running, and tripped by an emergency stop or by a bridge of another database."""
+    folder.mkdir()
+    for name, state in (("running", 2), ("stopped", 3), ("stranger", 3), ("blocked", 1)):
+        script = Script(messages, 0)
+        del script.data[0]
+        for sample in range(8):
+            script.data.append(0)
+            script.send(Part.CONTROLLER_FINGERPRINT, {Field.FINGERPRINT: messages.fingerprint})
+            script.sampled(Part.REFERENCES, sample, enable=int(name != "blocked"))
+        if name == "stopped":
+            script.send(Part.EMERGENCY_STOP, {Field.COMMAND: 1})
+        if name == "stranger":
+            script.send(Part.CONTROLLER_FINGERPRINT, {Field.FINGERPRINT: 1})
+            script.data.append(0)
+        (folder / name).write_bytes(script.data)
+        assert f"state {state}" in told(program, folder / name), f"{name} does not get where it should"
 
 
 def core() -> list[Path]:
@@ -183,11 +212,23 @@ def test_the_bridge_withstands_any_sequence(tmp_path: Path, bus: str) -> None:
     assert executed(done) > 10 * SECONDS, done.stderr[-2000:]
 
 
+@pytest.mark.parametrize("bus", BUSES)
+def test_the_converters_node_withstands_any_sequence(tmp_path: Path, bus: str) -> None:
+    messages = shipped(bus)
+    controller = tmp_path / "controller"  # for its header
+    write_folder(program_of("DualPort"), PREFIX, False, controller)
+    program = build(messages, "plant", tmp_path, *map(str, core()), f"-I{controller}")
+    plant_seeds(messages, tmp_path / "seeds", program)
+    corpus = BUILD / f"plant_{bus}"
+    done = fuzz(program, tmp_path / "seeds", corpus, f"-max_total_time={SECONDS}", "-max_len=4096")
+    assert done.returncode == 0, done.stderr[-4000:]
+    assert executed(done) > 10 * SECONDS, done.stderr[-2000:]
+
+
 @pytest.mark.parametrize(
     ("sound", "broken"),
     [
         ("result = GUST_OUT_OF_RANGE;", "result = GUST_DECODED;"),
-        ("frame->length == message->length &&", ""),
         ("if (!m->unpack(frame->data, found))", "if (!m->unpack(frame->data + 40, found))"),
     ],
 )
