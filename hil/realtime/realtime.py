@@ -81,9 +81,9 @@ def judge(runs: Sequence[machine.Outcome], linux: machine.Kernel, periods: int, 
         ("periods measured", peer["periods"]),
         ("deadlines missed, of all periods", f"{end['missed']} of {end['periods']}"),
         ("periods without references", peer["missing"]),
-        ("lateness of the bridge, max", f"{end['latest_ns'] / 1e3:.1f} us"),
+        ("lateness of the bridge, median / p99 / max", quantiles(end["lateness_us"])),
         ("lateness of the peer, mean / p99 / max", spread(peer["late_us"])),
-        ("deadline to references sent, median / p99", "{median} / {p99} us".format_map(end["response_us"])),
+        ("deadline to references sent, median / p99 / max", quantiles(end["response_us"])),
         ("Sync to references on the bus, mean / p99 / max", spread(peer["sync_to_references_us"])),
         ("deviation of their interval from 1 ms, mean / p99 / max", spread(peer["jitter_us"])),
         ("SCHED_FIFO, locked memory", f"{start['real_time']}, {start['locked']}"),
@@ -105,6 +105,11 @@ def judge(runs: Sequence[machine.Outcome], linux: machine.Kernel, periods: int, 
 def spread(times: dict[str, float]) -> str:
     """Three times in one cell."""
     return "{mean:.1f} / {p99:.1f} / {max:.1f} us".format_map(times)
+
+
+def quantiles(times: dict[str, float]) -> str:
+    """The same of the bridge's own statistics, in whole microseconds."""
+    return "{median} / {p99} / {max} us".format_map(times)
 
 
 if __name__ == "__main__":

@@ -83,6 +83,7 @@ static void run_monotonic(gust_loop *loop)
         gust_clock_sleep(deadline);
         const uint64_t late = gust_clock_now() - deadline;
         loop->latest = late > loop->latest ? late : loop->latest;
+        gust_times_add(&loop->lateness, late);
         periods = 1U + (uint32_t)(late / period);
         drain(loop, NULL, NULL);
         tick(loop, periods, deadline);

@@ -92,9 +92,9 @@ static void add_counts(line *l, const gust_counts *counts)
     add(l, "}");
 }
 
-static void add_times(line *l, const gust_times *times)
+static void add_times(line *l, const char *name, const gust_times *times)
 {
-    add(l, ", \"response_us\": {\"median\": %" PRIu32 ", \"p99\": %" PRIu32 ", \"max\": %" PRIu64 "}",
+    add(l, ", \"%s_us\": {\"median\": %" PRIu32 ", \"p99\": %" PRIu32 ", \"max\": %" PRIu64 "}", name,
         gust_times_quantile(times, SHARE_MEDIAN), gust_times_quantile(times, SHARE_P99),
         times->longest / NS_PER_US);
 }
@@ -108,7 +108,8 @@ void gust_report_statistics(FILE *file, const char *event, const gust_loop *loop
     add(&l, ", \"periods\": %" PRIu64 ", \"missed\": %" PRIu64 ", \"latest_ns\": %" PRIu64, loop->periods,
         loop->missed, loop->latest);
     add(&l, ", \"steps\": %" PRIu64 ", \"held\": %" PRIu64, bridge->steps, bridge->held);
-    add_times(&l, &loop->response);
+    add_times(&l, "lateness", &loop->lateness);
+    add_times(&l, "response", &loop->response);
     if (loop->watchdog != NULL) {
         add(&l, ", \"watchdog\": {\"fired\": %" PRIu64 ", \"sent\": %" PRIu64 "}",
             atomic_load(&loop->watchdog->fired), atomic_load(&loop->watchdog->sent));

@@ -38,6 +38,7 @@ typedef struct gust_loop {
     /* Read after the loop has ended, or as a rough picture before. */
     uint64_t periods, missed;
     uint64_t latest;     /* longest lateness of a tick after its deadline, ns */
+    gust_times lateness; /* all of them; monotonic */
     uint64_t drained;    /* largest number of frames in one period */
     gust_times response; /* from the frame that began a tick to its references; monotonic: from the deadline */
 } gust_loop;
