@@ -76,7 +76,7 @@ check: setup-dev ## ruff, mypy --strict, the layers and clang-format: seconds, n
 lint: check ## The quick checks and clang-tidy
 	$(call say,clang-tidy)
 	@git ls-files -z 'runtime/src/*.c' | xargs -0r -n 1 -P "$$(nproc)" $(BIN)/clang-tidy --quiet -p build/release
-	@git ls-files -z 'hil/bridge/src/*.c' | \
+	@git ls-files -z 'hil/bridge/src/*.c' 'hil/bridge/tools/*.c' | \
 		xargs -0rI@ -P "$$(nproc)" $(BIN)/clang-tidy --quiet @ -- $(BRIDGE_FLAGS) -D_GNU_SOURCE
 	@git ls-files -z 'hil/vcan/*.c' 'hil/realtime/*.c' 'hil/pil/*.c' ':!hil/pil/board.c' | \
 		xargs -0rI@ -P "$$(nproc)" $(BIN)/clang-tidy --quiet @ -- $(BRIDGE_FLAGS) -DCONTROLLER=dual_port_controller

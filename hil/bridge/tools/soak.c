@@ -24,7 +24,7 @@
 #include "gustform_bridge/socketcan.h"
 #include "gustform_bridge/transport.h"
 
-enum { WINDOW = 128, WARM = 2000, EXIT_USAGE = 2, PATIENCE_MS = 2000 };
+enum { WINDOW = 128, WARM = 2000, LEAST = 4000, EXIT_USAGE = 2, PATIENCE_MS = 2000 };
 static const uint64_t PATIENCE = PATIENCE_MS * UINT64_C(1000000); /* without a frame: the rest is lost */
 
 typedef struct stream {
@@ -40,18 +40,18 @@ typedef struct tally {
     double seconds;
 } tally;
 
+/* Resident memory: the second number of statm, in pages. */
 static long memory_kb(void)
 {
+    char line[128];
     FILE *const file = fopen("/proc/self/statm", "re");
-    long total = 0;
-    long resident = 0;
     if (file == NULL) {
         return 0;
     }
-    if (fscanf(file, "%ld %ld", &total, &resident) != 2) {
-        resident = 0;
-    }
+    const char *const read = fgets(line, sizeof line, file);
     (void)fclose(file);
+    const char *const second = read == NULL ? NULL : strchr(line, ' ');
+    const long resident = second == NULL ? 0 : strtol(second, NULL, 10);
     return resident * (sysconf(_SC_PAGESIZE) / 1024);
 }
 
@@ -266,8 +266,8 @@ int main(int argc, char **argv)
             interface = argv[k + 1];
         } else if (k + 1 < argc && strcmp(argv[k], "--frames") == 0) {
             frames = strtoull(argv[k + 1], &end, 10);
-            if (*end != '\0' || argv[k + 1][0] == '-' || frames < 2U * WARM || frames > 1000000000U) {
-                (void)fprintf(stderr, "gust-soak: --frames must be %d to 10^9\n", 2 * WARM);
+            if (*end != '\0' || argv[k + 1][0] == '-' || frames < LEAST || frames > 1000000000U) {
+                (void)fprintf(stderr, "gust-soak: --frames must be %d to 10^9\n", LEAST);
                 return EXIT_USAGE;
             }
         } else {
