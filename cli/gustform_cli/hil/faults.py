@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -22,9 +22,9 @@ _TRIES = 20  # of all faults together, in real time
 
 
 @contextmanager
-def bench_of(rig: RigFiles, interface: str, clock: str = "sync") -> Iterator[Bench]:
+def bench_of(rig: RigFiles, interface: str, clock: str = "sync", options: Sequence[str] = ()) -> Iterator[Bench]:
     """A bench with the rig's bridge, which ends with it."""
-    options = UNHURRIED if clock == "sync" else ()
+    options = (*(UNHURRIED if clock == "sync" else ()), *options)
     with Bus(interface, fd=rig.fd) as bus, Bridge(rig.bridge, interface, clock, options) as bridge:
         yield Bench(Client(bus, Codec(rig.messages)), rig.measurements, rig.set_points, bridge.check)
 

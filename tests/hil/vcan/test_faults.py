@@ -71,6 +71,14 @@ def test_another_database_never_gets_ready(rig_for: Callable[[str], RigFiles], i
         assert wrong_from_the_start(bench) == []
 
 
+@pytest.mark.parametrize(("fault", "periods"), [("burst_loss", 5), ("bit_flip", 5), ("counter_jump", 1)])
+def test_a_bridge_that_tolerates_more_is_found_out(rig: RigFiles, interface: str, fault: str, periods: int) -> None:
+    with bench_of(rig, interface, options=("--missing", "4")) as bench:
+        outcome = inject(bench, next(one for one in faults(bench) if one.name == fault))
+    assert outcome.periods == periods
+    assert outcome.good == (periods <= 3)
+
+
 def test_the_command_prints_them(rig: RigFiles, interface: str) -> None:
     done = CliRunner().invoke(app, ["hil", "faults", "--interface", interface, "--rig", str(rig.folder), "--json"])
     assert done.exit_code == 0, done.output
