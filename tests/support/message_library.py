@@ -81,6 +81,7 @@ int shim_decode(const gust_frame *frame, int *number, double *values, uint8_t *c
 uint32_t shim_encode(int number, const double *values, uint8_t counter, gust_frame *frame);
 uint8_t shim_ahead(int number, uint8_t last, uint8_t counter);
 int shim_find(int part, uint8_t piece);
+int shim_signal(int number, int field, const char *quantity);
 const char *shim_unit(int number, int signal);
 void shim_flips(const gust_frame *frame, uint64_t result[4]);
 void shim_codes(const gust_frame *frame, int byte, uint32_t result[65536]);
@@ -103,6 +104,10 @@ int shim_find(int part, uint8_t piece)
 {
     const gust_message *message = gust_message_find(&gust_messages, (gust_part)part, piece);
     return message == NULL ? -1 : (int)(message - gust_messages.messages);
+}
+int shim_signal(int number, int field, const char *quantity)
+{
+    return gust_message_signal(&gust_messages.messages[number], (gust_field)field, quantity);
 }
 const char *shim_unit(int number, int signal)
 {
@@ -214,6 +219,11 @@ class MessageLibrary:
     def ahead(self, message: Message, last: int, counter: int) -> int:
         """gust_message_ahead"""
         return int(self.library.shim_ahead(self.numbers[message.name], last, counter)) & 0xFF
+
+    def signal(self, message: Message, field: int, quantity: str | None) -> int:
+        """gust_message_signal; -1: none"""
+        name = None if quantity is None else quantity.encode()
+        return int(self.library.shim_signal(self.numbers[message.name], field, name))
 
     def flips(self, message: Message, data: bytes) -> tuple[int, int, int, int]:
         """Flips of one bit, how many of them passed; of two bits, how many of them passed."""

@@ -182,6 +182,14 @@ def test_what_is_not_mapped_is_neither_read_nor_sent(messages: MessageSet, tmp_p
     assert "NotUsed" not in {s.name for s in message.signals}
 
 
+def test_without_a_counter_each_frame_is_the_next_one(messages: MessageSet, tmp_path: Path) -> None:
+    c = MessageLibrary(messages, tmp_path)
+    assert [c.ahead(messages.by_name["PLC_Cmd"], last, 7) for last in (0, 7, 255)] == [1, 1, 1]
+    # Profile 1 counts 0 ... 14.
+    counted = messages.by_name["PLC_Ref"]
+    assert [c.ahead(counted, 14, counter) for counter in (14, 0, 1, 13)] == [0, 1, 2, 14]
+
+
 def test_operations_of_others_are_unknown(messages: MessageSet, tmp_path: Path) -> None:
     c, codec = MessageLibrary(messages, tmp_path), Codec(messages)
     message = messages.by_name["SVC"]

@@ -283,6 +283,18 @@ def test_parts_are_found(sets: dict[str, Set], bus: str) -> None:
             assert s.c.find(part, piece) == (-1 if found is None else s.c.numbers[found.name])
 
 
+@pytest.mark.parametrize("bus", BUSES)
+def test_signals_are_found(sets: dict[str, Set], bus: str) -> None:
+    s = sets[bus]
+    names = {signal.quantity for m in s.codec.messages.messages for signal in m.signals} | {"v", "v_dcc", "none"}
+    for message in s.codec.messages.messages:
+        for field in Field:
+            for quantity in (None, *sorted(names)):
+                found = message.signal(field, quantity)
+                expected = -1 if found is None else message.signals.index(found)
+                assert s.c.signal(message, field, quantity) == expected
+
+
 def enumerators(name: str) -> dict[str, int]:
     text = (bridge_folder() / "include" / "gustform_bridge" / "messages.h").read_text()
     body = re.search(rf"typedef enum {name} {{(.*?)}} {name};", text, re.DOTALL)
