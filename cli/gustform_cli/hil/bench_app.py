@@ -97,7 +97,7 @@ def faults(
 
 
 def soak(
-    frames: Annotated[int, typer.Option(metavar="N", min=4000, max=10**9, help="frames to send")] = 1_000_000,
+    frames: Annotated[int, typer.Option(metavar="N", min=1, max=10**9, help="frames to send")] = 1_000_000,
     interface: Interface = "vcan0",
     rig: Rig = None,
     json: Json = False,

@@ -24,7 +24,7 @@
 #include "gustform_bridge/socketcan.h"
 #include "gustform_bridge/transport.h"
 
-enum { WINDOW = 128, WARM = 2000, LEAST = 4000, EXIT_USAGE = 2, PATIENCE_MS = 2000 };
+enum { WINDOW = 128, WARM = 2000, EXIT_USAGE = 2, PATIENCE_MS = 2000 };
 static const uint64_t PATIENCE = PATIENCE_MS * UINT64_C(1000000); /* without a frame: the rest is lost */
 
 typedef struct stream {
@@ -39,6 +39,12 @@ typedef struct tally {
     long memory_start, memory_end; /* kB */
     double seconds;
 } tally;
+
+/* Frames after which memory is looked at for the first time: whatever is touched only once has been touched. */
+static uint64_t warm(uint64_t frames)
+{
+    return frames / 10U < WARM ? frames / 10U : WARM;
+}
 
 /* Resident memory: the second number of statm, in pages. */
 static long memory_kb(void)
@@ -95,7 +101,7 @@ static tally send_all(gust_transport *bus, const stream *what, uint64_t frames, 
     gust_frame frame;
     uint64_t open = WINDOW;
     for (uint64_t n = 0; n < frames; n++) {
-        if (n == WARM) {
+        if (n == warm(frames)) {
             result.memory_start = memory_kb();
         }
         if (open == 0) {
@@ -173,7 +179,7 @@ static tally receive_all(gust_transport *bus, const stream *what, uint64_t frame
         }
         begin = begin == 0 ? bus->now(bus) : begin;
         judge(what, &frame, &next, &counter, &result);
-        if (++result.frames == WARM) {
+        if (result.frames++ == warm(frames)) {
             result.memory_start = memory_kb();
         }
         if (result.frames % (WINDOW / 2) == 0) {
@@ -266,8 +272,8 @@ int main(int argc, char **argv)
             interface = argv[k + 1];
         } else if (k + 1 < argc && strcmp(argv[k], "--frames") == 0) {
             frames = strtoull(argv[k + 1], &end, 10);
-            if (*end != '\0' || argv[k + 1][0] == '-' || frames < LEAST || frames > 1000000000U) {
-                (void)fprintf(stderr, "gust-soak: --frames must be %d to 10^9\n", LEAST);
+            if (*end != '\0' || argv[k + 1][0] == '-' || frames == 0 || frames > 1000000000U) {
+                (void)fprintf(stderr, "gust-soak: --frames must be 1 to 10^9\n");
                 return EXIT_USAGE;
             }
         } else {

@@ -43,7 +43,7 @@ def test_what_is_wrong_is_told_with_the_exit_code_2(tmp_path: Path, words: list[
 
 
 def test_frames_of_a_soak_have_a_least_number() -> None:
-    assert CliRunner().invoke(app, ["hil", "soak", "--frames", "10"]).exit_code == 2
+    assert CliRunner().invoke(app, ["hil", "soak", "--frames", "0"]).exit_code == 2
 
 
 def test_a_database_of_ones_own() -> None:
