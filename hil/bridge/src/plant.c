@@ -126,7 +126,8 @@ static bool take_references(gust_plant *plant)
                                         : gust_sample_difference((uint32_t)(plant->number % modulus),
                                                                  plant->references.number, modulus);
     const bool enabled = enable_of(&plant->references) == 1.0;
-    ++plant->references_taken;
+    ++plant->heard;
+    plant->blocked = !enabled;
     /* Whoever does not enable is right, however old the sample. */
     if (enabled && (behind < 0 || behind > 1)) {
         return false;

@@ -86,12 +86,12 @@ static bool listen(tester *t, uint64_t *at)
     gust_frame frame;
     bool answered = false;
     while (transport->receive(transport, &frame) == GUST_TRANSPORT_OK) {
-        const uint64_t before = t->plant.references_taken;
+        const uint64_t before = t->plant.heard;
         if (gust_plant_receive(&t->plant, &frame)) {
             *at = frame.time;
             answered = true;
         }
-        if (t->watch && t->safe == 0 && t->plant.references_taken != before && !t->plant.enabled) {
+        if (t->watch && t->safe == 0 && t->plant.heard != before && t->plant.blocked) {
             t->safe = frame.time;
         }
     }

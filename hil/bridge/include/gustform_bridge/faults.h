@@ -23,7 +23,7 @@ typedef enum gust_state {
     X(4, MULTIPLEXER, "a multiplexer has a value that the database does not know")                             \
     X(5, NOT_FINITE, "a value is NaN or infinite under a good CRC")                                            \
     X(6, RANGE, "a value is outside of its range under a good CRC")                                            \
-    X(7, PLAUSIBILITY, "a measurement changed faster than it can, or contradicts another one")                 \
+    X(7, PLAUSIBILITY, "a measurement changed faster than it can")                                             \
     X(8, STALE, "the measurements answer to a sample that is too old")                                         \
     X(9, MASQUERADE, "somebody else sends a frame that only this bridge may send")                             \
     X(10, BUS_OFF, "the CAN controller has left the bus, or the interface is down")                            \

@@ -50,8 +50,9 @@ typedef struct gust_plant {
     uint32_t silent;              /* periods without an answer */
     uint32_t resting;             /* periods of references that are not enabled */
     uint64_t ticks, answers, trips;
-    uint64_t references_taken; /* complete samples of them */
-    bool mute;                 /* for tests: measurements are not sent */
+    uint64_t heard; /* complete samples of references, taken or not */
+    bool blocked;   /* the last of them was not enabled */
+    bool mute;      /* for tests: measurements are not sent */
     uint32_t told;
 } gust_plant;
 
