@@ -106,7 +106,7 @@ def archive(files: Mapping[str, bytes]) -> bytes:
 def init(folder: Path) -> Path:
     """The first process, which the guests of hil/vcan have as well."""
     program = folder / "guest_init"
-    sources = [str(VCAN / name) for name in ("guest_init.c", "vcan_link.c")]
+    sources = [str(VCAN / name) for name in ("guest_init.c", "guest_command.c", "vcan_link.c")]
     output("cc", "-std=gnu11", "-O2", "-static", *sources, "-o", str(program))
     return program
 

@@ -99,8 +99,7 @@ static int open_bus(const char *interface)
     return bus;
 }
 
-/* ---- Sending
- * -------------------------------------------------------------------------------------------------- */
+/* ---- Sending ---- */
 
 /* Measurements near the steady state at full speed; the link's voltage moves a hundredth to and fro at 5 Hz. */
 static double measured(const char *quantity, uint32_t sample, double otherwise)
@@ -185,8 +184,7 @@ static void send_all(struct peer *peer)
     send_part(peer, GUST_PART_SYNC);
 }
 
-/* ---- Listening
- * ------------------------------------------------------------------------------------------------ */
+/* ---- Listening ---- */
 
 /* One frame and when the kernel took it, or false. */
 static bool take(const struct peer *peer, gust_frame *frame, int64_t *when)
@@ -279,8 +277,7 @@ static void listen_to_all(struct peer *peer)
     }
 }
 
-/* ---- Results
- * --------------------------------------------------------------------------------------------------- */
+/* ---- Results ---- */
 
 static int by_size(const void *a, const void *b)
 {

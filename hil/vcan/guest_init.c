@@ -4,10 +4,10 @@
  *
  *   VCAN_INTERFACES=vcan0,vcan1   interfaces to make; each carries CAN FD frames
  *   VCAN_MODULES=FILE             kernel modules to load, one path a line, in this order
- *   VCAN_COMMAND=FILE             strings with a NUL after each: the working directory, the number of
- * arguments, the arguments, then the environment VCAN_STDOUT=, VCAN_STDERR=    terminal lines that lead to the
- * runner's streams VCAN_CONTROL=                 terminal line on which the runner and this program talk:
- *                                 "ready\n" and "exit N\n" go out, one byte with a signal's number comes in
+ *   VCAN_COMMAND=FILE             what to run, as guest_command.h has it
+ *   VCAN_STDOUT, VCAN_STDERR      terminal lines that lead to the runner's streams
+ *   VCAN_CONTROL                  terminal line between the runner and this program: "ready" and "exit N" go
+ *                                 out, a line each; one byte with the number of a signal comes in
  *
  * The same program serves user-mode Linux, where the root is the host's, and an initramfs. Whatever goes wrong
  * is written to the console, which is the runner's log, and ends the guest without an "exit" line. */
@@ -31,22 +31,13 @@
 #include <termios.h>
 #include <unistd.h>
 
+#include "guest_command.h"
 #include "vcan_link.h"
 
 enum {
-    STREAMS = 2,               /* stdout and stderr */
-    EXIT_NOT_EXECUTABLE = 126, /* as the shells say it */
-    EXIT_NOT_FOUND = 127,
+    STREAMS = 2, /* stdout and stderr */
     EXIT_SIGNAL = 128,
-    EXIT_RUNNER = 125, /* the command could not be begun: as env(1) and the runner say it */
-    QUIET_MS = 100     /* how long output of what the command left behind is waited for */
-};
-
-/* What is run: pointers into one buffer that lives as long as the guest. */
-struct command {
-    const char *directory;
-    char **arguments;   /* ends with NULL */
-    char **environment; /* ends with NULL */
+    QUIET_MS = 100 /* how long output of what the command left behind is waited for */
 };
 
 /* One stream of the command: the pipe it writes to and the line that leads out. */
@@ -90,8 +81,7 @@ static const char *setting(const char *name)
     return value;
 }
 
-/* ---- The file systems a program expects
- * ---------------------------------------------------------------------- */
+/* ---- The file systems a program expects ---- */
 
 static void mount_one(const char *type, const char *place, const char *options)
 {
@@ -166,85 +156,7 @@ static void make_interfaces(char *names)
     }
 }
 
-/* ---- The command
- * ------------------------------------------------------------------------------------------------ */
-
-static char *read_whole(const char *path, size_t *size)
-{
-    const int file = open(path, O_RDONLY | O_CLOEXEC);
-    struct stat about;
-    if (file < 0 || fstat(file, &about) != 0) {
-        fail(path);
-    }
-    *size = (size_t)about.st_size;
-    char *const text = malloc(*size + 1);
-    size_t done = 0;
-    while (text != NULL && done < *size) {
-        const ssize_t got = read(file, text + done, *size - done);
-        if (got <= 0) {
-            fail(path);
-        }
-        done += (size_t)got;
-    }
-    if (text == NULL) {
-        fail(path);
-    }
-    text[*size] = '\0';
-    (void)close(file);
-    return text;
-}
-
-static struct command read_command(const char *path)
-{
-    size_t size = 0;
-    char *const text = read_whole(path, &size);
-    size_t strings = 0;
-    for (size_t i = 0; i < size; i++) {
-        strings += text[i] == '\0';
-    }
-    /* Two strings come before the arguments; two ends are added. */
-    char **const pointers = calloc(strings + 2, sizeof *pointers);
-    if (pointers == NULL || strings < 3) {
-        fail(path);
-    }
-    const char *const directory = text;
-    char *next = text + strlen(text) + 1;
-    const size_t arguments = strtoul(next, NULL, 10);
-    if (arguments == 0 || arguments > strings - 2) {
-        errno = EINVAL;
-        fail(path);
-    }
-    size_t filled = 0;
-    for (size_t i = 0; i < strings - 2; i++) {
-        next += strlen(next) + 1;
-        filled += i == arguments; /* a NULL between the two lists */
-        pointers[filled++] = next;
-    }
-    return (struct command){directory, pointers, pointers + arguments + 1};
-}
-
-/* Runs in the child and does not return. What goes wrong is told on the command's own stderr. */
-static _Noreturn void become(const struct command *command, const int writers[STREAMS])
-{
-    sigset_t none;
-    (void)sigemptyset(&none);
-    (void)sigprocmask(SIG_SETMASK, &none, NULL);
-    (void)setsid();
-    (void)close(STDIN_FILENO);
-    (void)open("/dev/null", O_RDONLY); /* becomes the lowest free descriptor: stdin */
-    (void)dup2(writers[0], STDOUT_FILENO);
-    (void)dup2(writers[1], STDERR_FILENO);
-    if (chdir(command->directory) != 0) {
-        (void)dprintf(STDERR_FILENO, "with-vcan: %s: %s\n", command->directory, strerror(errno));
-        _exit(EXIT_RUNNER);
-    }
-    /* execvpe looks along the PATH of this process, which is to be the command's. */
-    environ = command->environment;
-    (void)execvp(command->arguments[0], command->arguments);
-    const int code = errno == ENOENT ? EXIT_NOT_FOUND : EXIT_NOT_EXECUTABLE;
-    (void)dprintf(STDERR_FILENO, "with-vcan: %s: %s\n", command->arguments[0], strerror(errno));
-    _exit(code);
-}
+/* ---- The command ---- */
 
 /* A line that passes every byte as it is. */
 static int open_line(const char *path)
@@ -282,7 +194,7 @@ static struct session start(const struct command *command)
     session.children = signalfd(-1, &child, SFD_CLOEXEC | SFD_NONBLOCK);
     session.child = fork();
     if (session.child == 0) {
-        become(command, writers);
+        command_become(command, writers[0], writers[1]);
     }
     if (session.child < 0 || session.children < 0) {
         fail("fork");
@@ -294,8 +206,7 @@ static struct session start(const struct command *command)
     return session;
 }
 
-/* ---- Following it to its end
- * --------------------------------------------------------------------------------- */
+/* ---- Following it to its end ---- */
 
 static void reap(struct session *session)
 {
@@ -379,7 +290,10 @@ int main(void)
     }
     make_interfaces(interfaces);
     free(interfaces);
-    const struct command command = read_command(setting("VCAN_COMMAND"));
+    struct command command;
+    if (!command_read(setting("VCAN_COMMAND"), &command)) {
+        fail("VCAN_COMMAND");
+    }
     struct session session = start(&command);
     follow(&session);
     for (int i = 0; i < STREAMS; i++) {

@@ -1,5 +1,4 @@
-/* Preloaded into linux.uml on hosts whose processors have more state than it knows (AMX: 11,008 bytes, not
- * 2,696).
+/* Preloaded into linux.uml where the processor has more state than it knows: AMX, 11,008 bytes and not 2,696.
  *
  * Debian 12's user-mode Linux hands a process's vector registers to PTRACE_SETREGSET in an area of fixed size,
  * and the host's kernel takes only an area of exactly its own size: EFAULT, and the guest panics at its first

@@ -241,7 +241,8 @@ for words in (["netem", "delay", "100ms", "limit", "5"], ["tbf", "rate", "8kbit"
     except OSError as error: print(errno.errorcode[error.errno], sent < 10)
     print(received() == sent)
 """
-    result = run(sys.executable, "-c", program)
+    path = f"{os.environ['PATH']}:/usr/sbin:/sbin"
+    result = run(sys.executable, "-c", program, environment={"PATH": path})
     assert result.stdout == "True\nENOBUFS True\nTrue\nENOBUFS True\nTrue\n", result.stderr
 
 
