@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 from gustform.language.errors import GustformError
 from gustform_hil.bus import Bus
 from gustform_hil.codec import Codec, Problem
-from gustform_hil.message_set import E2E_FIELDS, Field, Message, Part, Signal
+from gustform_hil.message_set import E2E_FIELDS, Field, Message, MessageSet, Part, Signal
 
 if TYPE_CHECKING:
     import can
@@ -105,6 +105,7 @@ class Client:
         self.heard = Heard()
         self._counters: Counter[str] = Counter()
         self._pieces: dict[int, dict[int, Received]] = {}
+        self._names = names_of(codec.messages)
         self._parts = {part: codec.messages.pieces(part) for part in Part}
         self._n_pieces = len(self._parts[Part.REFERENCES])
 
@@ -114,9 +115,18 @@ class Client:
         for message in self._parts[part]:
             count = self._counters[message.name]
             self._counters[message.name] += 1
-            data = self.codec.encode(message, _signals(message, values), count, cut=cut)
+            data = self.codec.encode(message, self._signals(message, values), count, cut=cut)
             made.append(Frame(message.id, data, message.fd))
         return made
+
+    def _signals(self, message: Message, values: Values) -> dict[str, float]:
+        """Values by the names of the signals; what is not given is sent as safe, numbers of samples begin again."""
+        names = self._names[message.name]
+        given = {s.name: values.get(names[s.name], s.safe) for s in message.signals if s.name in names}
+        sample = message.signal(Field.SAMPLE)
+        if sample is not None:
+            given[sample.name] %= sample.high + 1
+        return given
 
     def skip(self, part: Part, frames: int = 1) -> None:
         """Count frames as if they had been sent: what a loss looks like from the other side."""
@@ -137,7 +147,7 @@ class Client:
         frame = self.bus.receive(timeout)
         if frame is None:
             return None
-        found = decode(self.codec, frame)
+        found = decode(self.codec, self._names, frame)
         if found is None:
             return frame
         self._note(found)
@@ -178,8 +188,16 @@ class Client:
             yield found
 
 
-def decode(codec: Codec, frame: can.Message) -> Received | None:
-    """A frame of the bus, or None if it is no data frame of the message set."""
+Names = Mapping[str, Mapping[str, str]]
+
+
+def names_of(messages: MessageSet) -> Names:
+    """By what the signals of each message are called here, without those of the E2E header."""
+    return {m.name: {s.name: key_of(s) for s in m.signals if s.field not in E2E_FIELDS} for m in messages.messages}
+
+
+def decode(codec: Codec, names: Names, frame: can.Message) -> Received | None:
+    """A frame of the bus, or None if it is no data frame of the message set. `names` are those of names_of()."""
     if frame.is_error_frame or frame.is_remote_frame or frame.is_extended_id:
         return None
     decoded = codec.decode(frame.arbitration_id, bytes(frame.data), fd=frame.is_fd)
@@ -188,23 +206,13 @@ def decode(codec: Codec, frame: can.Message) -> Received | None:
     values = {}
     if decoded.problem is None:
         found = decoded.values
-        signals = decoded.message.signals
-        values = {key_of(s): found[s.name] for s in signals if s.name in found and s.field not in E2E_FIELDS}
+        values = {key: found[name] for name, key in names[decoded.message.name].items() if name in found}
     return Received(decoded.message, values, decoded.counter, decoded.problem, frame.timestamp)
 
 
 def key_of(signal: Signal) -> str:
     """By what a value is called here: its quantity, or the field: "v_dc", "sample"."""
     return signal.quantity or signal.field.name.lower()
-
-
-def _signals(message: Message, values: Values) -> dict[str, float]:
-    """Values by the names of the signals; what is not given is sent as safe, numbers of samples begin again."""
-    given = {signal.name: values.get(key_of(signal), signal.safe) for signal in message.signals}
-    sample = message.signal(Field.SAMPLE)
-    if sample is not None:
-        given[sample.name] %= sample.high + 1
-    return given
 
 
 class Converter:

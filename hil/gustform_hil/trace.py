@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from gustform_hil.client import decode
+from gustform_hil.client import decode, names_of
 from gustform_hil.codec import Codec
 from gustform_hil.log import read_log
 from gustform_hil.message_set import Field, Message, Part
@@ -65,6 +65,7 @@ def trace(frames: Iterable[can.Message], codec: Codec, name: str) -> Trace:
 class _Collector:
     def __init__(self, codec: Codec) -> None:
         self._codec = codec
+        self._names = names_of(codec.messages)
         self._sync = codec.messages.pieces(Part.SYNC)[0]
         quantities = [s for m in codec.messages.messages for s in m.signals if s.field == Field.QUANTITY]
         self._safe = {s.quantity: float(np.float32(s.safe)) if s.real else s.safe for s in quantities}
@@ -75,7 +76,7 @@ class _Collector:
         self._answered: dict[int, dict[str, float]] = {}
 
     def add(self, frame: can.Message) -> None:
-        found = decode(self._codec, frame)
+        found = decode(self._codec, self._names, frame)
         if found is None:
             return
         if found.problem is not None:
