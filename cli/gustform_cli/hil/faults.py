@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, replace
@@ -18,7 +19,9 @@ from gustform_hil.faults import LIMIT, Outcome, faults, inject, wrong_from_the_s
 from gustform_hil.process import UNHURRIED, Bridge
 from gustform_hil.rig_files import RigFiles
 
-_TRIES = 20  # of all faults together, in real time
+# Pauses of this computer in the bridge itself; what the bus may do is as strict as ever.
+_LENIENT = ("--watchdog", "1000", "--deadlines", "100", "--quiet", "5")
+_TRIES = 4  # of each fault, in real time
 
 
 @contextmanager
@@ -43,23 +46,30 @@ def run(interface: str, rig: Path | None, *, monotonic: bool = False) -> list[Ou
 
 
 def _in_real_time(rig: RigFiles, interface: str) -> list[Outcome]:
-    """Each fault into a bridge of its own, again where Python was too slow to keep it running. GF8077."""
+    """Each fault into a bridge of its own, again where Python was too slow to keep it running. GF8077: always."""
     done: list[Outcome] = []
-    slow = 0
+    failure: GustformError | None = None
+    number, tries = 0, 0
     while True:
-        with bench_of(rig, interface, "monotonic") as bench:
+        with bench_of(rig, interface, "monotonic", _LENIENT) as bench:
             twelve = faults(bench)
-            if len(done) == len(twelve):
-                return done
+            if number == len(twelve):
+                break
             try:
-                outcome = inject(bench, twelve[len(done)])
+                outcome = inject(bench, twelve[number])
+                done.append(replace(outcome, to_safe_ms=outcome.wall_ms))
             except GustformError as error:
-                slow += 1
-                if error.code != "GF8077" or slow > _TRIES:
-                    hint = "a computer, or an hour, in which Python sends a period's frames within a millisecond"
-                    raise GustformError(error.code, error.message, hint=hint) from None
-                continue
-        done.append(replace(outcome, to_safe_ms=outcome.wall_ms))
+                if error.code != "GF8077":
+                    raise
+                failure, tries = error, tries + 1
+                if tries < _TRIES:
+                    continue
+                print(f"{twelve[number].name}: this computer is too slow to measure it", file=sys.stderr)
+        number, tries = number + 1, 0
+    if not done and failure is not None:
+        hint = "a faster computer, Python has to send within a millisecond; or build/gust-latency of the rig"
+        raise GustformError(failure.code, failure.message, hint=hint)
+    return done
 
 
 def good(outcomes: list[Outcome]) -> bool:
