@@ -7,7 +7,8 @@
  * set-point is needed to become READY.
  *
  * At most one sample of references is under way: if it has not left within one period, none is queued after it,
- * and that is a fault. Nothing is ever sent twice. So no command older than one period is handed to the bus.
+ * and that is a fault. (A tick that comes soon after a late one queues none and waits for the next.) Nothing is
+ * ever sent twice. So no command older than one period is handed to the bus.
  *
  * Ownership: the caller's, everything pointed to must outlive it. Nothing is allocated. One thread, except
  * the last three functions.

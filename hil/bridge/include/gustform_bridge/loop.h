@@ -36,7 +36,8 @@ typedef struct gust_loop {
     gust_event events[GUST_LOOP_EVENTS];
     _Atomic uint64_t n_events;
     /* Read after the loop has ended, or as a rough picture before. */
-    uint64_t periods, missed;
+    _Atomic uint64_t periods;
+    uint64_t missed;
     uint64_t latest;     /* longest lateness of a tick after its deadline, ns */
     gust_times lateness; /* all of them; monotonic */
     uint64_t drained;    /* largest number of frames in one period */
