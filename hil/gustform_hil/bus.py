@@ -27,6 +27,7 @@ _BUFFER = 4 << 20  # bytes for what comes in while Python is busy; the kernel ma
 
 _HEADER = struct.Struct("=IBB2x")  # of struct can_frame and struct canfd_frame
 _BIT_RATE_SWITCH = 1
+_EXTENDED_FLAG, _IDENTIFIER = 0x8000_0000, 0x1FFF_FFFF
 ERROR_FLAG = 0x2000_0000  # CAN_ERR_FLAG of linux/can.h
 BUS_OFF = 0x40  # CAN_ERR_BUSOFF of linux/can/error.h
 
@@ -78,7 +79,7 @@ class Bus:
         """`only`: identifiers to receive; error frames are received in any case."""
         can = python_can()
         check_interface(interface, fd=fd)
-        filters = None if only is None else [{"can_id": i, "can_mask": 0x7FF, "extended": False} for i in only]
+        filters = None if only is None else [{"can_id": i, "can_mask": _IDENTIFIER} for i in only]
         try:
             self._bus: Any = can.Bus(interface="socketcan", channel=interface, fd=fd, can_filters=filters)
         except (OSError, can.CanError) as error:
@@ -114,11 +115,12 @@ class Bus:
         """The socket itself, for its options."""
         return self._bus.socket
 
-    def send(self, identifier: int, data: bytes, *, fd: bool, error: bool = False) -> bool:
+    def send(self, identifier: int, data: bytes, *, fd: bool, extended: bool = False, error: bool = False) -> bool:
         """Send one frame; False if the queue was full (ENOBUFS) and the frame is gone. GF8073 for anything else."""
         # Past python-can, which asks the kernel for the time and for room before each frame: a lock-step pays for it.
         size, flags = (64, _BIT_RATE_SWITCH) if fd else (8, 0)
-        frame = _HEADER.pack(identifier | (ERROR_FLAG if error else 0), len(data), flags) + data.ljust(size, b"\0")
+        kind = (ERROR_FLAG if error else 0) | (_EXTENDED_FLAG if extended else 0)
+        frame = _HEADER.pack(identifier | kind, len(data), flags) + data.ljust(size, b"\0")
         try:
             self.raw.send(frame)
         except OSError as failure:
@@ -128,14 +130,14 @@ class Bus:
                 "GF8073", f"a frame could not be sent on {self.interface}; {failure}", hint="a look at the interface"
             ) from None
         if self.taps:
-            self._tell(identifier, data, fd, error)
+            self._tell(identifier, data, fd, extended, error)
         return True
 
-    def _tell(self, identifier: int, data: bytes, fd: bool, error: bool) -> None:
+    def _tell(self, identifier: int, data: bytes, fd: bool, extended: bool, error: bool) -> None:
         message = self._message(
             arbitration_id=identifier,
             data=data,
-            is_extended_id=False,
+            is_extended_id=extended,
             is_fd=fd,
             bitrate_switch=fd,
             is_error_frame=error,

@@ -18,8 +18,9 @@ from typing import TYPE_CHECKING
 
 from gustform.language.errors import GustformError
 from gustform_hil.bus import Bus
-from gustform_hil.codec import Codec, Problem
-from gustform_hil.message_set import E2E_FIELDS, Field, Message, MessageSet, Part, Signal
+from gustform_hil.codec import Codec
+from gustform_hil.decoding import Received, decode, names_of
+from gustform_hil.message_set import Field, Message, Part
 
 if TYPE_CHECKING:
     import can
@@ -62,17 +63,7 @@ class Frame:
     identifier: int
     data: bytes
     fd: bool
-
-
-@dataclass(frozen=True)
-class Received:
-    """A frame of the message set. `values` are by quantity or by field, none where there is a `problem`."""
-
-    message: Message
-    values: dict[str, float]
-    counter: int
-    problem: Problem | None
-    time: float
+    extended: bool = False
 
 
 @dataclass(frozen=True)
@@ -116,7 +107,7 @@ class Client:
             count = self._counters[message.name]
             self._counters[message.name] += 1
             data = self.codec.encode(message, self._signals(message, values), count, cut=cut)
-            made.append(Frame(message.id, data, message.fd))
+            made.append(Frame(message.id, data, message.fd, message.extended))
         return made
 
     def _signals(self, message: Message, values: Values) -> dict[str, float]:
@@ -135,7 +126,7 @@ class Client:
 
     def put(self, frames: list[Frame]) -> bool:
         """Send frames; False if the queue was full for one of them."""
-        sent = [self.bus.send(frame.identifier, frame.data, fd=frame.fd) for frame in frames]
+        sent = [self.bus.send(frame.identifier, frame.data, fd=frame.fd, extended=frame.extended) for frame in frames]
         return all(sent)
 
     def send(self, part: Part, values: Values) -> bool:
@@ -186,33 +177,6 @@ class Client:
         """What has come in and was not read yet."""
         while (found := self.receive(0.0)) is not None:
             yield found
-
-
-Names = Mapping[str, Mapping[str, str]]
-
-
-def names_of(messages: MessageSet) -> Names:
-    """By what the signals of each message are called here, without those of the E2E header."""
-    return {m.name: {s.name: key_of(s) for s in m.signals if s.field not in E2E_FIELDS} for m in messages.messages}
-
-
-def decode(codec: Codec, names: Names, frame: can.Message) -> Received | None:
-    """A frame of the bus, or None if it is no data frame of the message set. `names` are those of names_of()."""
-    if frame.is_error_frame or frame.is_remote_frame or frame.is_extended_id:
-        return None
-    decoded = codec.decode(frame.arbitration_id, bytes(frame.data), fd=frame.is_fd)
-    if decoded.message is None:
-        return None
-    values = {}
-    if decoded.problem is None:
-        found = decoded.values
-        values = {key: found[name] for name, key in names[decoded.message.name].items() if name in found}
-    return Received(decoded.message, values, decoded.counter, decoded.problem, frame.timestamp)
-
-
-def key_of(signal: Signal) -> str:
-    """By what a value is called here: its quantity, or the field: "v_dc", "sample"."""
-    return signal.quantity or signal.field.name.lower()
 
 
 class Converter:

@@ -12,7 +12,7 @@ import random
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from gustform_hil.bench import Bench, Tick
 from gustform_hil.bus import BUS_OFF
@@ -209,7 +209,7 @@ def _flipped(random_: random.Random) -> Callable[[Bench, int], None]:
             data = bytearray(frame.data)
             bit = random_.randrange(8 * len(data))
             data[bit // 8] ^= 1 << bit % 8
-            damaged.append(Frame(frame.identifier, bytes(data), frame.fd))
+            damaged.append(replace(frame, data=bytes(data)))
         bench.client.put(damaged)
 
     return send
@@ -239,7 +239,7 @@ def _shortened(bench: Bench, k: int) -> None:
     shorter = []
     for frame in bench.measure():
         length = 32 if frame.fd and len(frame.data) > 32 else len(frame.data) - 1
-        shorter.append(Frame(frame.identifier, frame.data[: min(length, 8) if length < 12 else length], frame.fd))
+        shorter.append(replace(frame, data=frame.data[: min(length, 8) if length < 12 else length]))
     bench.client.put(shorter)
 
 

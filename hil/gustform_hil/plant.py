@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gustform.language.errors import GustformError
-from gustform_hil.client import Client, Command, Converter, ConverterState, Operator, References, State, key_of
+from gustform_hil.client import Client, Command, Converter, ConverterState, Operator, References, State
+from gustform_hil.decoding import key_of
 from gustform_hil.faults import fault_names
 from gustform_hil.message_set import Field, MessageSet, Part
 

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from gustform_hil.client import decode, names_of
 from gustform_hil.codec import Codec
+from gustform_hil.decoding import decode, names_of
 from gustform_hil.log import read_log
 from gustform_hil.message_set import Field, Message, Part
 
