@@ -49,9 +49,15 @@ demo: setup ## Set everything up and run the load-step scenario into ./demo
 	@$(BIN)/gustform simulate $(DEMO_SCENARIO) --out $(DEMO_OUT)
 
 # The tests on a CAN bus keep one processor busy, much of the rest uses one at a time: side by side they save minutes.
+# What they say is shown when the others are through, so that neither hides the progress of the other.
 .PHONY: test
 test: setup-dev ## All checks, C tests under sanitizers, every Python test, the tests on a CAN bus
-	@$(MAKE) -j 2 --output-sync=target test-host test-hil
+	@mkdir -p build; $(MAKE) test-hil >build/test-hil.log 2>&1 & bus=$$!; \
+		trap 'kill -TERM $$bus 2>/dev/null || true' EXIT; \
+		$(MAKE) test-host || host=$$?; \
+		wait $$bus || on_bus=$$?; \
+		cat build/test-hil.log; \
+		exit $$(($${host:-0} | $${on_bus:-0}))
 
 .PHONY: test-host
 test-host: setup-dev ## The same without the tests on a CAN bus
