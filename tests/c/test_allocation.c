@@ -5,42 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "allocations.h"
 #include "support.h"
-
-static long allocations;
-
-void *__real_malloc(size_t size);
-void *__real_calloc(size_t count, size_t size);
-void *__real_realloc(void *block, size_t size);
-void *__real_aligned_alloc(size_t alignment, size_t size);
-void *__wrap_malloc(size_t size);
-void *__wrap_calloc(size_t count, size_t size);
-void *__wrap_realloc(void *block, size_t size);
-void *__wrap_aligned_alloc(size_t alignment, size_t size);
-
-void *__wrap_malloc(size_t size)
-{
-    ++allocations;
-    return __real_malloc(size);
-}
-
-void *__wrap_calloc(size_t count, size_t size)
-{
-    ++allocations;
-    return __real_calloc(count, size);
-}
-
-void *__wrap_realloc(void *block, size_t size)
-{
-    ++allocations;
-    return __real_realloc(block, size);
-}
-
-void *__wrap_aligned_alloc(size_t alignment, size_t size)
-{
-    ++allocations;
-    return __real_aligned_alloc(alignment, size);
-}
 
 /* Value = time, a sample every 0.1 s, for ever. */
 static int read_ramp(void *context, int64_t first, int64_t count, double *time, double *value)

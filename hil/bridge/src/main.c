@@ -6,13 +6,10 @@
 #include <errno.h>
 #include <inttypes.h>
 #include <poll.h>
-#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/eventfd.h>
 #include <sys/mman.h>
-#include <sys/signalfd.h>
 #include <unistd.h>
 
 #include "gustform_bridge/bridge.h"
@@ -22,6 +19,7 @@
 #include "gustform_bridge/plant_program.h"
 #include "gustform_bridge/report.h"
 #include "gustform_bridge/socketcan.h"
+#include "gustform_bridge/wakeup.h"
 #include "gustform_bridge/watchdog.h"
 
 #define JOIN_(a, b)     a##b
@@ -50,7 +48,7 @@ typedef struct program {
     gust_loop loop;
     pthread_t thread;
     bool real_time, locked;
-    int signals;
+    gust_wakeup wakeup;
 } program;
 
 static int fail(const gust_error *error, int code)
@@ -63,25 +61,6 @@ static void *run_loop(void *context)
 {
     gust_loop_run(context);
     return NULL;
-}
-
-/* Blocked in all threads, and read from a descriptor. */
-static bool take_signals(program *p, gust_error *error)
-{
-    sigset_t set;
-    (void)sigemptyset(&set);
-    (void)sigaddset(&set, SIGTERM);
-    (void)sigaddset(&set, SIGINT);
-    (void)signal(SIGPIPE, SIG_IGN);
-    if (pthread_sigmask(SIG_BLOCK, &set, NULL) != 0) {
-        return gust_fail(error, "GF8062: signals cannot be blocked");
-    }
-    p->signals = signalfd(-1, &set, SFD_CLOEXEC);
-    p->loop.wake = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
-    if (p->signals < 0 || p->loop.wake < 0) {
-        return gust_fail(error, "GF8062: no descriptor for signals (%s). Look at: ulimit -n", strerror(errno));
-    }
-    return true;
 }
 
 /* The number of events that were printed; those that were overwritten meanwhile are not. */
@@ -98,7 +77,7 @@ static uint64_t print_events(gust_loop *loop, uint64_t printed)
 
 static void watch(program *p)
 {
-    struct pollfd descriptors[] = {{.fd = p->signals, .events = POLLIN},
+    struct pollfd descriptors[] = {{.fd = p->wakeup.signals, .events = POLLIN},
                                    {.fd = p->loop.wake, .events = POLLIN}};
     uint64_t printed = 0;
     bool ended = false;
@@ -183,10 +162,12 @@ static bool start(program *p, gust_error *error)
         .synchronous = p->options.synchronous,
         .tune = p->options.tune,
         .age = p->options.synchronous ? 0 : (uint64_t)(CONTROLLER_HERE.period * 1e9)};
-    if (!gust_bridge_init(&p->bridge, &config, error) || !open_bus(p, error) || !take_signals(p, error)) {
+    if (!gust_bridge_init(&p->bridge, &config, error) || !open_bus(p, error) ||
+        !gust_wakeup_open(&p->wakeup, error)) {
         return false;
     }
     p->locked = p->options.real_time && mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
+    p->loop.wake = p->wakeup.word;
     p->loop.bridge = &p->bridge;
     p->loop.transport = &p->loop_socket.transport;
     p->loop.watchdog = &p->watchdog;

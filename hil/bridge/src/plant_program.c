@@ -4,12 +4,9 @@
 
 #include <errno.h>
 #include <poll.h>
-#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/eventfd.h>
-#include <sys/signalfd.h>
 #include <unistd.h>
 
 #include "gustform_bridge/clock.h"
@@ -18,6 +15,7 @@
 #include "gustform_bridge/report.h"
 #include "gustform_bridge/socketcan.h"
 #include "gustform_bridge/times.h"
+#include "gustform_bridge/wakeup.h"
 
 #define NS_PER_S 1e9
 #define TEXT     256
@@ -34,7 +32,7 @@ typedef struct plant_run {
     uint64_t latest, missed;
     atomic_bool stop;
     bool failed;
-    int signals, ended;
+    gust_wakeup wakeup;
     pthread_t thread;
 } plant_run;
 
@@ -148,28 +146,10 @@ static void *simulate(void *context)
     plant_run *r = context;
     const uint64_t one = 1;
     r->failed = !gust_plant_model_run(&r->model, r->text, sizeof r->text);
-    if (write(r->ended, &one, sizeof one) < 0) {
+    if (write(r->wakeup.word, &one, sizeof one) < 0) {
         r->failed = true;
     }
     return NULL;
-}
-
-static bool take_signals(plant_run *r, gust_error *error)
-{
-    sigset_t set;
-    (void)sigemptyset(&set);
-    (void)sigaddset(&set, SIGTERM);
-    (void)sigaddset(&set, SIGINT);
-    (void)signal(SIGPIPE, SIG_IGN);
-    if (pthread_sigmask(SIG_BLOCK, &set, NULL) != 0) {
-        return gust_fail(error, "GF8062: signals cannot be blocked");
-    }
-    r->signals = signalfd(-1, &set, SFD_CLOEXEC);
-    r->ended = eventfd(0, EFD_CLOEXEC);
-    if (r->signals < 0 || r->ended < 0) {
-        return gust_fail(error, "GF8062: no descriptor for signals (%s). Look at: ulimit -n", strerror(errno));
-    }
-    return true;
 }
 
 static void print_end(const plant_run *r)
@@ -190,7 +170,7 @@ static void print_end(const plant_run *r)
 static bool run(plant_run *r, gust_error *error)
 {
     if (!open_model(r, error) || !gust_socketcan_open(&r->socket, r->options->interface, true, error) ||
-        !take_signals(r, error)) {
+        !gust_wakeup_open(&r->wakeup, error)) {
         return false;
     }
     const size_t stack = (size_t)8 * 1024 * 1024; /* the solver's, not a loop's */
@@ -200,7 +180,8 @@ static bool run(plant_run *r, gust_error *error)
         return gust_fail(error, "GF8062: no thread for the model. Look at: ulimit -u");
     }
     (void)pthread_attr_destroy(&attributes);
-    struct pollfd descriptors[] = {{.fd = r->signals, .events = POLLIN}, {.fd = r->ended, .events = POLLIN}};
+    struct pollfd descriptors[] = {{.fd = r->wakeup.signals, .events = POLLIN},
+                                   {.fd = r->wakeup.word, .events = POLLIN}};
     while (poll(descriptors, 2, -1) < 0 && errno == EINTR) {
     }
     atomic_store(&r->stop, true);
