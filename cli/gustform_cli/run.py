@@ -66,6 +66,10 @@ class Attachment(Protocol):
         """The run is to end; from any thread."""
         ...
 
+    def detach(self) -> None:
+        """The last sample has been made, however the run ends; what is written and drawn after it may take long."""
+        ...
+
 
 class Run:
     """A run into `file`, or into none. A context; `execute` may work in any thread while others use `time` and
@@ -163,7 +167,11 @@ class Run:
             self._simulation = Simulation(self.table.to_bytes())
             statistics = self.plan.create() if self.plan.needed else None
             try:
-                status = self._integrate(self._simulation, statistics)
+                try:
+                    status = self._integrate(self._simulation, statistics)
+                finally:
+                    if self._attached is not None:
+                        self._attached.detach()
             finally:
                 counters = self._simulation.statistics()
                 signalled = controller_warnings(self._simulation)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -62,10 +62,11 @@ class OnBus:
         if self.plant is not None:
             self.plant.stop()
 
-    def close(self) -> None:
-        """Leave the bridge in a state in which it commands nothing."""
+    def detach(self) -> None:
+        """Leave the bridge in a state in which it commands nothing, before it misses the next sample."""
         if self.plant is not None:
-            self.plant.close()
+            with suppress(GustformError):  # a bus that is gone: the bridge knows, and why the run ended is said already
+                self.plant.close()
 
 
 def plant(
@@ -91,10 +92,7 @@ def plant(
         if log is not None:
             bus.taps.append(stack.enter_context(Log(log)))
         on_bus = OnBus(Client(bus, Codec(messages)), name, start)
-        try:
-            return simulate(scenario, out, settings, interrupt, figure=figure, attached=on_bus)
-        finally:
-            on_bus.close()
+        return simulate(scenario, out, settings, interrupt, figure=figure, attached=on_bus)
 
 
 _HEARD = frozenset({Part.REFERENCES, Part.CONTROLLER_STATE, Part.CONTROLLER_HEARTBEAT, Part.CONTROLLER_FINGERPRINT})

@@ -17,6 +17,7 @@ import h5py
 import numpy as np
 import pytest
 
+from gustform_cli.figures import draw
 from gustform_cli.hil.compare import compare
 from gustform_cli.hil.plant import message_set, plant
 from gustform_cli.hil.rigs import SCENARIO
@@ -216,6 +217,28 @@ def test_interrupted_everything_is_readable_and_nothing_is_commanded(
     trace = read_trace(tmp_path / "bus.log", Codec(message_set("fd", None, None)))
     assert trace.start is not None
     assert (trace.lost, trace.damaged) == (0, 0)
+
+
+def test_the_bridge_is_stopped_before_the_figure_is_drawn(
+    rig: RigFiles, interface: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Drawing takes seconds: a bridge that still ran would hear nothing of its plant, and end in SAFE."""
+    drawn: list[object] = []
+
+    def after_the_run(result: Path, figure: Path) -> Path:
+        deadline = time.monotonic() + PATIENCE
+        while (state := bridge.events[-1].get("state")) == "RUN" and time.monotonic() < deadline:
+            time.sleep(0.01)
+        drawn.append(state)
+        return draw(result, figure)
+
+    monkeypatch.setattr("gustform_cli.figures.draw", after_the_run)
+    chosen = message_set("fd", None, None)
+    with Bridge(rig.bridge, interface, "sync", UNHURRIED) as bridge:
+        outcome = plant(SCENARIO, tmp_path, settings(0.1, "10ms"), Interrupt(), chosen, interface, start=True)
+    assert drawn == ["READY"]
+    assert outcome.figure is not None
+    assert outcome.figure.is_file()
 
 
 def test_the_plant_waits_for_an_operator_and_ends_at_an_emergency_stop(
