@@ -19,6 +19,7 @@ from gustform_codegen.emit.controller.footprint import as_json, as_text, footpri
 from gustform_codegen.emit.controller.frequency import as_csv, frequency_response
 from gustform_codegen.emit.controller.frequency import as_text as differences
 from gustform_codegen.emit.controller.program import Program, program
+from gustform_codegen.sampled_start import rounded
 
 _LONGEST = 1.0  # s; a longer period is a slip of the unit
 
@@ -130,12 +131,7 @@ def block_of_scenario(name: str, scenario: Path, overrides: Sequence[str], *, sc
             at = {u.path: float(state.table.start[first + k]) for k, u in enumerate(t.unit.unknowns)}
             values |= at
             values |= {alias: sign * at[path] for alias, (path, sign) in t.unit.aliases.items() if path in at}
-    rounded = {key: _rounded(v) for key, v in values.items()}
+    values = {key: rounded(v) for key, v in values.items()}
     turbine = found.component
     part = turbine.schedule if schedule and isinstance(turbine.schedule, CurtailmentSchedule) else None
-    return controller_block(turbine.control, turbine.pitch, rounded, part)
-
-
-def _rounded(value: float) -> float:
-    """To the digits that a steady state is solved to, so that the files are the same wherever it is solved."""
-    return float(f"{value:.9g}") if abs(value) > 1e-9 else 0.0
+    return controller_block(turbine.control, turbine.pitch, values, part)
