@@ -12,6 +12,8 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "gustform_bridge/clock.h"
+
 #define NS_PER_S       UINT64_C(1000000000)
 #define RECEIVE_BUFFER (4 * 1024 * 1024)
 
@@ -23,9 +25,7 @@ static gust_socketcan *of(gust_transport *transport)
 static uint64_t clock_now(gust_transport *transport)
 {
     (void)transport;
-    struct timespec now;
-    (void)clock_gettime(CLOCK_MONOTONIC, &now);
-    return (uint64_t)now.tv_sec * NS_PER_S + (uint64_t)now.tv_nsec;
+    return gust_clock_now();
 }
 
 static gust_transport_status status_of(int error)
