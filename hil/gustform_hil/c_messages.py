@@ -146,9 +146,7 @@ def _pack(prefix: str, message: Message) -> list[str]:
     for number, s in _in_order(message):
         member = snake_case(s.name)
         call = f"m.{member} = {prefix}_{stem}_{member}_encode(values[{number}]);"
-        lines.append(f"    {call}" if s.multiplexed < 0 else f"    if (m.{_multiplexer(message)} == {s.multiplexed}U)")
-        if s.multiplexed >= 0:
-            lines.append(f"        {call}")
+        lines += _where_present(message, s, call)
     pack = f"{prefix}_{stem}_pack(data, &m, {message.length}U) == {message.length}"
     return [*lines, *_known(message), f"    return {pack};", "}", ""]
 
@@ -167,10 +165,15 @@ def _unpack(prefix: str, message: Message) -> list[str]:
     for number, s in _in_order(message):
         member = snake_case(s.name)
         call = f"values[{number}] = {prefix}_{stem}_{member}_decode(m.{member});"
-        lines.append(f"    {call}" if s.multiplexed < 0 else f"    if (m.{_multiplexer(message)} == {s.multiplexed}U)")
-        if s.multiplexed >= 0:
-            lines.append(f"        {call}")
+        lines += _where_present(message, s, call)
     return [*lines, "    return true;", "}", ""]
+
+
+def _where_present(message: Message, s: Signal, statement: str) -> list[str]:
+    """The statement, if need be under the value of the multiplexer that the signal is there for."""
+    if s.multiplexed < 0:
+        return [f"    {statement}"]
+    return [f"    if (m.{_multiplexer(message)} == {s.multiplexed}U)", f"        {statement}"]
 
 
 def _in_order(message: Message) -> list[tuple[int, Signal]]:

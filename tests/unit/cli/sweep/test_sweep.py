@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import signal
+import subprocess
 import time
 from pathlib import Path
 
@@ -184,16 +185,21 @@ def test_a_warning_is_said_once_and_before(tmp_path: Path) -> None:
     assert "repeat" in result.stderr
 
 
+def wait_for_cases(process: subprocess.Popen[str], out: Path, more_than: int) -> None:
+    """Until more cases than that have ended; the sweep still runs then."""
+    deadline = time.monotonic() + 60.0
+    while not ((out / JOURNAL).is_file() and (out / JOURNAL).read_bytes().count(b"\n") > more_than):
+        assert process.poll() is None, process.communicate()
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
 def test_ctrl_c_keeps_what_has_ended(tmp_path: Path) -> None:
     values = ", ".join(f"{seed}" for seed in range(1, 201))
     body = f"axes: [{{type: grid, values: {{wind.wt.seed: [{values}]}}}}]\nkeep: all"
     file, out = write(tmp_path, body, SHORT.replace("5 s", "1 h")), tmp_path / "out"
     process = start(file, out, "--workers", 2)
-    deadline = time.monotonic() + 60.0
-    while not ((out / JOURNAL).is_file() and (out / JOURNAL).read_bytes().count(b"\n") > 3):
-        assert process.poll() is None, process.communicate()
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
+    wait_for_cases(process, out, 3)
     os.kill(process.pid, signal.SIGINT)
     stdout, stderr = process.communicate(timeout=60)
     assert process.returncode == 130, stderr
@@ -208,11 +214,7 @@ def test_kill_9_keeps_what_has_ended(tmp_path: Path) -> None:
     body = f"axes: [{{type: grid, values: {{wind.wt.seed: [{values}]}}}}]"
     file, out = write(tmp_path, body, SHORT.replace("5 s", "5 min")), tmp_path / "out"
     process = start(file, out, "--workers", 2)
-    deadline = time.monotonic() + 60.0
-    while not ((out / JOURNAL).is_file() and (out / JOURNAL).read_bytes().count(b"\n") > 5):
-        assert process.poll() is None, process.communicate()
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
+    wait_for_cases(process, out, 5)
     process.kill()
     process.communicate()
     result = sweep(file, out, "--json")
