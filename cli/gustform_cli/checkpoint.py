@@ -120,7 +120,7 @@ def read(folder: Path) -> Checkpoint:
     if not found:
         raise GustformError(
             "GF7006",
-            f"there is no checkpoint in {str(folder)!r}: the run is complete, had none, or did not begin",
+            f"there is no checkpoint in {str(folder)!r}: the run had none, or did not begin",
             hint="run.checkpoint: 10 min in the scenario, or a folder with a file *.checkpoint",
         )
     try:

@@ -11,14 +11,15 @@ from pathlib import Path
 
 from gustform.language.errors import GustformError
 from gustform_cli.assemble import Assembled, assemble
-from gustform_cli.checkpoint import Checkpoint, read
+from gustform_cli.checkpoint import SUFFIX, Checkpoint, read
 from gustform_cli.checkpointing import check_same
 from gustform_cli.document import parse
 from gustform_cli.interrupt import Interrupt
 from gustform_cli.model import link, load, placed, print_warnings
 from gustform_cli.progress import RunProgress
-from gustform_cli.result import RESULT, prepare_folder
+from gustform_cli.result import PARTIAL, RESULT, prepare_folder
 from gustform_cli.run import Attachment, Ended, Run
+from gustform_cli.run_data import RunData
 from gustform_cli.summary import Summary, write_summary
 from gustform_codegen.initial import steady_state
 
@@ -53,7 +54,14 @@ def simulate(
 
 def resume(folder: Path, interrupt: Interrupt, *, figure: bool = True) -> Outcome:
     """Go on with the run in a folder from its last checkpoint. GF7006 if there is none, GF7007 if the model or the
-    versions have changed, GF7008 if it is damaged."""
+    versions have changed, GF7008 if it is damaged.
+
+    A run that is complete may have been killed before its summary or its figure was whole: they are made again.
+    """
+    if (summary := _of_complete(folder)) is not None:
+        print(f"the run is complete, up to {summary.simulated_seconds:g} s", file=sys.stderr)
+        interrupt.closing()
+        return _leave(folder, folder / RESULT, summary, None, figure)
     found = read(folder)
 
     def again() -> Assembled:
@@ -92,14 +100,28 @@ def _simulate(
     name = found.result if found is not None else RESULT
     with Run(model, table, out / name, resume=found, attached=attached) as run:
         ended = _watch(run, build_seconds, interrupt, found.time if found is not None else 0.0)
-    summary_file = write_summary(ended.summary, out)
+    return _leave(out, ended.result, ended.summary, ended.error, figure and run.rows >= 2)
+
+
+def _of_complete(folder: Path) -> Summary | None:
+    """The summary of a run that needs no going on, as its result has it; None for all others."""
+    result = folder / RESULT
+    if any(folder.glob(f"*{SUFFIX}")) or (folder / PARTIAL).exists() or not result.exists():
+        return None
+    with RunData(result) as run:
+        return Summary.from_dict(run.json("statistics")) if run.attribute("status") == "completed" else None
+
+
+def _leave(out: Path, result: Path, summary: Summary, error: GustformError | None, figure: bool) -> Outcome:
+    """Summary and figure beside a closed result."""
+    summary_file = write_summary(summary, out)
     drawn = out / FIGURE
     drawn.unlink(missing_ok=True)  # one of an earlier run would not belong to this result
-    if not figure or run.rows < 2:
-        return Outcome(ended.result, summary_file, None, ended.summary, ended.error)
+    if not figure:
+        return Outcome(result, summary_file, None, summary, error)
     from gustform_cli.figures import draw  # a second of imports, after the run
 
-    return Outcome(ended.result, summary_file, draw(ended.result, drawn), ended.summary, ended.error)
+    return Outcome(result, summary_file, draw(result, drawn), summary, error)
 
 
 def _watch(run: Run, build_seconds: float, interrupt: Interrupt, start: float) -> Ended:

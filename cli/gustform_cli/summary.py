@@ -29,6 +29,7 @@ _MORE = (
     "rows",
 )
 SOLVER_FIGURES = (*_COUNTERS, *_MORE)
+_ALWAYS = ("status", "simulated_seconds", "wall_seconds", "build_seconds", "compiled_types", "unknowns")
 
 
 def write_summary(summary: Summary, folder: Path) -> Path:
@@ -91,3 +92,21 @@ class Summary:
         if self.warnings:
             result["warnings"] = list(self.warnings)
         return result
+
+    @classmethod
+    def from_dict(cls, keys: Mapping[str, Any]) -> Summary:
+        """The summary that `as_dict` gave these keys."""
+        left = dict(keys)
+        left.pop("real_time_factor")
+        solver = {name: left.pop(name) for name in SOLVER_FIGURES if name in left}
+        known = {name: left.pop(name) for name in _ALWAYS}
+        return cls(
+            **known,
+            solver=solver,
+            frequency=left.pop("frequency", None),
+            events=left.pop("grid_events", ()),
+            trips=left.pop("trips", {}),
+            message=left.pop("message", None),
+            warnings=tuple(left.pop("warnings", ())),
+            statistics=left,
+        )

@@ -109,6 +109,32 @@ def test_killed_at_random_moments(tmp_path: Path, whole: tuple[Path, float], see
     assert_same(tmp_path, whole[0])
 
 
+def test_killed_after_the_last_row(tmp_path: Path) -> None:
+    """The result was whole; summary and figure were not. A complete run may be resumed as often as one likes."""
+    scenario, out = SCENARIOS / "load_step_8ms.yaml", tmp_path / "out"
+    process = run(command(scenario, "--out", out, "--set", "run.checkpoint=20 s"))
+    assert process.returncode == 0, process.stderr
+    whole = {path.name: path.read_bytes() for path in out.iterdir()}
+    assert set(whole) == {"result.nc", "summary.json"}
+    for left in (b"", whole["summary.json"][:100], None):
+        summary = out / "summary.json"
+        summary.unlink()
+        if left is not None:
+            summary.write_bytes(left)
+        process = run(command("--resume", out))
+        assert process.returncode == 0, process.stderr
+        assert "the run is complete, up to 90 s" in process.stderr
+        assert {path.name: path.read_bytes() for path in out.iterdir()} == whole
+    drawn = run([word for word in command("--resume", out) if word != "--no-figure"])
+    assert drawn.returncode == 0, drawn.stderr
+    assert (out / "figure.png").read_bytes().startswith(b"\x89PNG")
+    # Another run has begun in the same folder: that one is not complete, and had no checkpoint.
+    (out / "result.nc.part").write_bytes(b"")
+    process = run(command("--resume", out))
+    assert process.returncode == 2
+    assert "GF7006" in process.stderr
+
+
 def kill_in_the_middle(out: Path, *changes: str) -> None:
     """Leaves a run that was killed after its first hour."""
     process = subprocess.Popen(
@@ -270,6 +296,8 @@ def test_how_often() -> None:
 _DIES = """
 import os, sys
 import gustform_cli.checkpoint as files
+import gustform_cli.run
+import gustform_cli.simulate
 from gustform_cli.result import ResultWriter
 from gustform_cli.main import main
 def die(*a, **k): os._exit(9)
@@ -282,14 +310,18 @@ elif where == "rename":
     ResultWriter.rename = die
 elif where == "names":
     files.keep_names = die
+elif where == "discard":
+    gustform_cli.run.discard = die
+elif where == "summary":
+    gustform_cli.simulate.write_summary = die
 sys.argv[0] = "gustform"
 main()
 """
 
 
-@pytest.mark.parametrize("where", ["adopt", "places", "rename", "names"])
-def test_dying_while_the_rows_are_copied(tmp_path: Path, whole: tuple[Path, float], where: str) -> None:
-    """Between any two of the steps in which a resumed run makes the old rows its own."""
+@pytest.mark.parametrize("where", ["adopt", "places", "rename", "names", "discard", "summary"])
+def test_dying_in_between(tmp_path: Path, whole: tuple[Path, float], where: str) -> None:
+    """Between any two of the steps in which a resumed run makes the old rows its own, and of those that end it."""
     kill_in_the_middle(tmp_path)
     words = command("--resume", tmp_path)
     process = run([sys.executable, "-c", _DIES, where, *words[3:]])
