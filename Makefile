@@ -102,8 +102,9 @@ test-python: setup-dev ## Python tests on all cores; ARGS=... goes to pytest
 .PHONY: test-hil
 test-hil: setup-dev ## Tests on a real vcan: this kernel's, else one in user-mode Linux; ARGS=... goes to pytest
 	$(call say,rigs for the tests on a CAN bus)
-	@printf '%s\n' fd classic | $(QUIETLY) build/rigs.log xargs -P 2 -I@ \
-		$(BIN)/gustform hil build $(DEMO_SCENARIO) --bus @ --out build/rigs/@
+	@printf '%s\n' 'fd' 'classic --bus classic' 'scheduled --set wt.schedule.type=CurtailmentSchedule' | \
+		$(QUIETLY) build/rigs.log xargs -P 2 -L 1 \
+		sh -c 'exec $(BIN)/gustform hil build $(DEMO_SCENARIO) --out build/rigs/"$$0" "$$@"'
 	$(call say,tests on a CAN bus)
 	@GUSTFORM_RIGS=$(CURDIR)/build/rigs $(BIN)/python hil/vcan/with-vcan $(BIN)/python -m pytest -p no:cacheprovider tests/hil/vcan $(ARGS)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from gustform.control.converter_control import ConverterControl
 from gustform.control.curtailment_schedule import CurtailmentSchedule
-from gustform.language.component import suggest
+from gustform.language.component import Component, suggest
 from gustform.language.errors import GustformError
 from gustform.registry import PARTS
 from gustform.turbines.pmsg_turbine import PmsgTurbine
@@ -40,7 +40,7 @@ def export_controller(
     method: str,
     overrides: Sequence[str],
     report: bool,
-    schedule: bool = True,
+    schedule: bool | None = None,
 ) -> str:
     """Write the folder; returns what to print: with `report` the table of differences, the memory needed, the path."""
     h = sample_period(period)
@@ -103,15 +103,16 @@ def default_block(name: str) -> Block:
     return controller_block(turbine.control, turbine.pitch)
 
 
-def block_of_scenario(name: str, scenario: Path, overrides: Sequence[str], *, schedule: bool = True) -> Block:
+def block_of_scenario(name: str, scenario: Path, overrides: Sequence[str], *, schedule: bool | None = None) -> Block:
     """The control of a turbine of a scenario, with the set points and states of its steady state. GF2047.
 
-    Where its operating point comes from a CurtailmentSchedule, that is part of it; without `schedule`, an input.
+    Where its operating point comes from a CurtailmentSchedule, that is part of it, or what it gives is an input: as its
+    `location` says, unless `schedule` is given.
     """
     from gustform_cli.design import only_turbine
     from gustform_cli.model import link, load, placed, print_warnings
     from gustform_codegen.initial import steady_state
-    from gustform_codegen.sampled import continuous
+    from gustform_codegen.sampled import continuous, schedule_of
 
     assembled = load(scenario, overrides)
     print_warnings(assembled)
@@ -133,5 +134,7 @@ def block_of_scenario(name: str, scenario: Path, overrides: Sequence[str], *, sc
             values |= {alias: sign * at[path] for alias, (path, sign) in t.unit.aliases.items() if path in at}
     values = {key: rounded(v) for key, v in values.items()}
     turbine = found.component
-    part = turbine.schedule if schedule and isinstance(turbine.schedule, CurtailmentSchedule) else None
+    part: Component | None = schedule_of(turbine)
+    if schedule is not None:
+        part = turbine.schedule if schedule and isinstance(turbine.schedule, CurtailmentSchedule) else None
     return controller_block(turbine.control, turbine.pitch, values, part)

@@ -54,8 +54,12 @@ def controller(
         typer.Option("--set", metavar="PATH=VALUE", help="change one value of the scenario, e.g. wt.K_gsc=0.4"),
     ] = None,
     schedule: Annotated[
-        bool, typer.Option("--schedule/--no-schedule", help="with the scenario's curtailment schedule, or its result")
-    ] = True,
+        bool | None,
+        typer.Option(
+            "--schedule/--no-schedule",
+            help="with the scenario's curtailment schedule, or its result as input [as its location says]",
+        ),
+    ] = None,
     report: Annotated[
         bool, typer.Option("--report", help="compare with the continuous frequency response; adds frequency.csv")
     ] = False,

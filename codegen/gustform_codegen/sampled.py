@@ -1,9 +1,9 @@
 """Sampled controllers of a linked system: which library steps them, what they measure and what they hold.
 
-A turbine whose control is `sampled` has no equations for it. The C that `gustform export controller` writes for that
-control is compiled, and the runtime steps it beside the equations. Instances whose controllers differ by numbers alone
-share one library: their numbers are data of the blocks. The steady state is that of the continuous control, see
-`held_start`.
+A turbine whose control is `sampled` has no equations for it, nor for a curtailment schedule that is part of it. The C
+that `gustform export controller` writes for them is compiled, and the runtime steps it beside the equations. Instances
+whose controllers differ by numbers alone share one library: their numbers are data of the blocks. The steady state is
+that of the continuous control, see `held_start`.
 """
 
 from __future__ import annotations
@@ -14,8 +14,10 @@ from typing import Any
 
 import numpy as np
 
+from gustform.control.curtailment_schedule import CurtailmentSchedule
 from gustform.control.pitch import HeldPitchDemand
 from gustform.language.component import Component
+from gustform.language.declare import Part, Table
 from gustform.language.errors import GustformError
 from gustform.language.system import System
 from gustform.turbines.pmsg_turbine import PmsgTurbine
@@ -53,7 +55,22 @@ def is_sampled(component: Component) -> bool:
             f"control.sampled = {component.control.sampled:g} s: both controls are one controller",
             hint="no type for pitch",
         )
+    schedule = component.schedule
+    if isinstance(schedule, CurtailmentSchedule) and schedule.sampled != component.control.sampled:
+        raise GustformError(
+            "GF4105",
+            f"{type(component).__name__}.schedule.sampled = {schedule.sampled:g} s, which does not go with "
+            f"control.sampled = {component.control.sampled:g} s: both are one controller",
+            hint="no period for schedule",
+        )
     return sampled
+
+
+def schedule_of(turbine: Any) -> CurtailmentSchedule | None:
+    """The schedule that is part of a turbine's exported controller, if one is."""
+    schedule = turbine.schedule
+    inside = isinstance(schedule, CurtailmentSchedule) and schedule.location == "controller"
+    return schedule if inside else None
 
 
 def continuous(system: System) -> System:
@@ -114,12 +131,21 @@ def _controller(
 ) -> _Controller:
     assert linked.twin is not None
     turbine: Any = linked.twin.system.components[name]
-    control, pitch, double = turbine.control, turbine.pitch, component.part(_CONTROL).value("real") == "double"
+    control, pitch, schedule = turbine.control, turbine.pitch, schedule_of(turbine)
+    double = component.part(_CONTROL).value("real") == "double"
     period = float(component.part(_CONTROL).value("sampled"))
-    numbers = control.parameter_values() | pitch.parameter_values()
-    key = (control.structure_key(), pitch.structure_key(), period, tuple(numbers.items()))
+    parts = [control, pitch] if schedule is None else [control, pitch, schedule]
+    numbers: dict[str, float] = {}
+    for part in parts:
+        numbers |= part.parameter_values()
+    key = (
+        *(part.structure_key() for part in parts),
+        period,
+        tuple(numbers.items()),
+        *(_tables(part) for part in parts),
+    )
     if key not in _programs:
-        _programs[key] = program(discretise(controller_block(control, pitch), period))
+        _programs[key] = program(discretise(controller_block(control, pitch, schedule=schedule), period))
     made = _programs[key]
     names = Names(default_prefix(made.step.block.name), double)
     same = source(_without_values(made), names)
@@ -136,6 +162,18 @@ def _controller(
         _paths(made.step.parameters, list(numbers)),
         _paths(made.step.block.states, variables),
     )
+
+
+def _tables(component: Component) -> tuple[bytes, ...]:
+    """The numbers in the tables of a component and its parts: they are text of the C."""
+    found: list[bytes] = []
+    for name, declaration in component.declarations().items():
+        if isinstance(declaration, Table):
+            table = component.table(name)
+            found += [table.x.tobytes(), table.y.tobytes(), table.value.tobytes()]
+        elif isinstance(declaration, Part):
+            found += _tables(component.part(name))
+    return tuple(found)
 
 
 def library_sources(made: Program, names: Names) -> dict[str, str]:
@@ -156,13 +194,19 @@ def _without_values(made: Program) -> Program:
         return [replace(s, value=0.0) for s in signals]
 
     block = made.step.block
-    block = replace(block, inputs=zero(block.inputs), outputs=zero(block.outputs), states=zero(block.states))
+    block = replace(
+        block,
+        inputs=zero(block.inputs),
+        outputs=zero(block.outputs),
+        states=zero(block.states),
+        monitors=zero(block.monitors),
+    )
     return replace(made, step=replace(made.step, block=block, parameters=zero(made.step.parameters)))
 
 
 def _paths(signals: list[Signal], paths: list[str]) -> list[str]:
     """The paths in the unit that the names in C stand for."""
-    places = (f"{_CONTROL}.", f"{_PITCH}.")
+    places = (f"{_CONTROL}.", f"{_PITCH}.", f"{_SCHEDULE}.")
     named = {p.removeprefix(places[0]).replace(".", "_"): p for p in paths if p.startswith(places)}
     return [named[s.name] for s in signals]
 
@@ -192,12 +236,14 @@ def _block(linked: Linked, t: LinkedType, number: int, k: int, controller: _Cont
         period=step.period,
         measurement=np.array(measurement, dtype=np.int32),
         command=np.array([discretes.index(path) for path in held], dtype=np.int32),
+        monitor=np.array([discretes.index(f"{_SCHEDULE}.{s.name}") for s in block.monitors], dtype=np.int32),
         parameters=np.array([numbers[path] for path in controller.parameter_paths]),
         states=np.array([s.value for s in block.states]),
         measurement_names=[s.name for s in block.inputs],
         measurement_units=[s.unit for s in block.inputs],
         command_names=[s.name for s in block.outputs],
         command_units=[s.unit for s in block.outputs],
+        monitor_names=[s.name for s in block.monitors],
         parameter_paths=controller.parameter_paths,
         state_paths=controller.state_paths,
     )

@@ -83,12 +83,14 @@ class SampledTable:
     period: float
     measurement: Ints  # (m, 3): kind of channel, unknown or output, sign
     command: Ints  # discrete values of the instance
+    monitor: Ints  # others, for what the controller tells of itself
     parameters: Floats
     states: Floats
     measurement_names: list[str]
     measurement_units: list[str]
     command_names: list[str]
     command_units: list[str]
+    monitor_names: list[str]
     parameter_paths: list[str]
     state_paths: list[str]
 
@@ -122,9 +124,9 @@ class Sampled:
             )
             s[p + "period"] = np.array([b.period])
             s[p + "measurement"] = b.measurement.ravel()
-            for name in ("command", "parameters", "states"):
+            for name in ("command", "monitor", "parameters", "states"):
                 s[p + name] = getattr(b, name)
-            for name in ("measurement_names", "measurement_units", "command_names", "command_units"):
+            for name in ("measurement_names", "measurement_units", "command_names", "command_units", "monitor_names"):
                 s[p + name] = strings(getattr(b, name))
         return s
 

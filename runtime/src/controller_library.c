@@ -36,7 +36,8 @@ static bool complete(const gust_controller *controller)
     return numbers && calls && controller->name != NULL && controller->control != NULL &&
            controller->period > 0.0 && signals_fit(controller, controller->inputs, controller->n_inputs) &&
            signals_fit(controller, controller->outputs, controller->n_outputs) &&
-           signals_fit(controller, controller->parameters, controller->n_parameters);
+           signals_fit(controller, controller->parameters, controller->n_parameters) &&
+           signals_fit(controller, controller->monitors, controller->n_monitors);
 }
 
 const gust_controller *gust_controller_open(const char *path, void **library, char *message, size_t size)

@@ -188,6 +188,9 @@ gust_status gust_controls_start(gust_controls *controls, gust_system *system, do
         }
         memcpy(control->waiting, control->command, (size_t)control->what->info.n_commands * sizeof(double));
         control->due = true;
+        for (int32_t i = 0; control->step != NULL && i < control->what->n_monitors; ++i) {
+            held(control, system)[control->what->monitor[i]] = NAN; /* a host gives commands only */
+        }
     }
     gust_controls_hold(controls, system, &changed);
     return GUST_OK;
@@ -296,6 +299,12 @@ void gust_controls_hold(gust_controls *controls, gust_system *system, bool *chan
             double *value = &target[what->command[i]];
             *changed = *changed || *value != acting[i];
             *value = acting[i];
+        }
+        /* What the controller tells of itself has no delay, and no equation reads it: nothing changes by it.
+         * Before the first sample it is what the table says. */
+        for (int32_t i = 0; control->step == NULL && control->count > 0 && i < what->n_monitors; ++i) {
+            target[what->monitor[i]] =
+                gust_controller_get(control->controller, control->context, &control->controller->monitors[i]);
         }
     }
 }

@@ -124,7 +124,7 @@ static bool read_kind(gust_reader *load, gust_model_sampled *block)
 }
 
 /* What the block says of its controller must be what the controller says of itself. */
-static bool check_controller(gust_reader *load, const gust_model_sampled *block)
+static bool check_controller(gust_reader *load, const gust_model_sampled *block, const char *const *monitors)
 {
     if (block->library < 0) {
         return true;
@@ -134,6 +134,7 @@ static bool check_controller(gust_reader *load, const gust_model_sampled *block)
     const uint64_t states = (uint64_t)block->n_states * controller->real_size;
     bool same = controller->n_inputs == (uint32_t)info->n_measurements &&
                 controller->n_outputs == (uint32_t)info->n_commands &&
+                controller->n_monitors == (uint32_t)block->n_monitors &&
                 (int64_t)controller->n_parameters == block->n_parameters &&
                 controller->real_size == (uint32_t)info->real_size && controller->period == info->period &&
                 block->state_offset % controller->real_size == 0 &&
@@ -143,6 +144,9 @@ static bool check_controller(gust_reader *load, const gust_model_sampled *block)
     }
     for (int32_t k = 0; same && k < info->n_commands; ++k) {
         same = strcmp(controller->outputs[k].name, info->command_name[k]) == 0;
+    }
+    for (int32_t k = 0; same && k < block->n_monitors; ++k) {
+        same = strcmp(controller->monitors[k].name, monitors[k]) == 0;
     }
     return same ||
            gust_refuse(load, GUST_BAD_CONTROLLER,
@@ -164,28 +168,33 @@ static bool read_block(gust_reader *load, int32_t number, int64_t first_start)
     const void *sized = NULL;
     int64_t measurements = 0;
     int64_t commands = 0;
+    int64_t monitors = 0;
     int64_t states = 0;
     if (!gust_read_sized(load, "measurement", GUST_I32, &sized, &measurements) ||
         !gust_read_sized(load, "command", GUST_I32, &sized, &commands) ||
+        !gust_read_sized(load, "monitor", GUST_I32, &sized, &monitors) ||
         !gust_read_sized(load, "parameters", GUST_F64, &sized, &block->n_parameters) ||
         !gust_read_sized(load, "states", GUST_F64, &sized, &states)) {
         return false;
     }
     if (measurements % PER_MEASUREMENT != 0 || measurements / PER_MEASUREMENT > INT32_MAX ||
-        commands > INT32_MAX || states > INT32_MAX) {
+        commands > INT32_MAX || monitors > INT32_MAX || states > INT32_MAX) {
         return gust_refuse(load, GUST_BAD_TABLE, "the sampled block \"%s\" has too many values", info->name);
     }
     info->n_measurements = (int32_t)(measurements / PER_MEASUREMENT);
     info->n_commands = (int32_t)commands;
+    block->n_monitors = (int32_t)monitors;
     block->n_states = (int32_t)states;
     const char **measured = NULL;
     const char **measured_unit = NULL;
     const char **commanded = NULL;
     const char **commanded_unit = NULL;
+    const char **monitored = NULL;
     if (!gust_read_texts(load, "measurement_names", info->n_measurements, &measured) ||
         !gust_read_texts(load, "measurement_units", info->n_measurements, &measured_unit) ||
         !gust_read_texts(load, "command_names", commands, &commanded) ||
-        !gust_read_texts(load, "command_units", commands, &commanded_unit)) {
+        !gust_read_texts(load, "command_units", commands, &commanded_unit) ||
+        !gust_read_texts(load, "monitor_names", monitors, &monitored)) {
         return false;
     }
     info->measurement_name = measured;
@@ -194,8 +203,10 @@ static bool read_block(gust_reader *load, int32_t number, int64_t first_start)
     info->command_unit = commanded_unit;
     if (!read_measurements(load, block) ||
         !gust_read_indices(load, "command", commands, 0, type->kernel->n_discrete, &block->command) ||
+        !gust_read_indices(load, "monitor", monitors, 0, type->kernel->n_discrete, &block->monitor) ||
         !gust_read_finite(load, "parameters", block->n_parameters, &block->parameters) ||
-        !gust_read_finite(load, "states", states, &block->states) || !check_controller(load, block)) {
+        !gust_read_finite(load, "states", states, &block->states) ||
+        !check_controller(load, block, monitored)) {
         return false;
     }
     double *start = model->sampled_starts + first_start;

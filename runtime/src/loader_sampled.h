@@ -4,7 +4,7 @@
 
 #include "reader.h"
 
-enum { GUST_TEXT_TABLES_OF_SAMPLED = 4 };
+enum { GUST_TEXT_TABLES_OF_SAMPLED = 5 };
 
 /* How many there are, before anything is allocated; a model without the section has none. */
 bool gust_read_sampled_counts(gust_reader *load);

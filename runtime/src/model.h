@@ -105,9 +105,11 @@ typedef struct gust_model_sampled {
     int64_t n_parameters;
     gust_measurement *measurement; /* [info.n_measurements] */
     const int32_t *command;        /* [info.n_commands] discrete values of the instance */
-    const double *parameters;      /* of the controller at the start */
-    const double *states;  /* of the controller at the start, one after the other from state_offset on */
-    uint32_t state_offset; /* in the context, bytes */
+    const int32_t *monitor;        /* [n_monitors] others, for what the controller tells of itself */
+    int32_t n_monitors;
+    const double *parameters; /* of the controller at the start */
+    const double *states;     /* of the controller at the start, one after the other from state_offset on */
+    uint32_t state_offset;    /* in the context, bytes */
 } gust_model_sampled;
 
 /* A parameter of a sampled block's controller gets another value. */

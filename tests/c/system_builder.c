@@ -318,16 +318,20 @@ void builder_law(system_builder *builder, int32_t number, const int32_t kind[6],
     const built_type *type = &builder->types[kind[0]];
     const int32_t measurement[] = {0, x, 1, 1, 0, 1};
     const int32_t command[] = {1};
+    const int32_t monitor[] = {0};
+    const char *const monitored[] = {"seen"};
     const size_t n = kind[2] == LIBRARY ? 1 : 0;
     writer_text(writer, of_block(number, "name"), type->instances[kind[1]].name);
     writer_i32(writer, of_block(number, "kind"), kind, 6);
     writer_f64(writer, of_block(number, "period"), &period, 1);
     writer_i32(writer, of_block(number, "measurement"), measurement, 6);
     writer_i32(writer, of_block(number, "command"), command, 1);
+    writer_i32(writer, of_block(number, "monitor"), monitor, 1);
     writer_f64(writer, of_block(number, "parameters"), numbers, 2 * n);
     writer_f64(writer, of_block(number, "states"), numbers + 2, n);
     writer_texts(writer, of_block(number, "measurement_names"), measured, 2);
     writer_texts(writer, of_block(number, "measurement_units"), units, 2);
     writer_texts(writer, of_block(number, "command_names"), commanded, 1);
     writer_texts(writer, of_block(number, "command_units"), slopes, 1);
+    writer_texts(writer, of_block(number, "monitor_names"), monitored, 1);
 }

@@ -154,6 +154,42 @@ static host new_host(void)
     return (host){.k = (float)START.k, .i = (float)START.i, .s = (float)START.s};
 }
 
+/* What the controller tells of itself: of the sample just now, whatever the delay; a host tells nothing. */
+static void monitor(void **state)
+{
+    (void)state;
+    for (int32_t delay = 0; delay <= 1; ++delay) {
+        for (int by_host = 0; by_host <= 1; ++by_host) {
+            static system_builder builder;
+            plants(&builder);
+            memcpy(builder.channel + 3, (const int32_t[]){1, 0, 3}, 3 * sizeof(int32_t));
+            builder_sampled(&builder, 1, 1, 0);
+            add_block(&builder, 0, 0, LIBRARY, delay, T);
+            gust_model *model = builder_model(&builder);
+            gust_sim *sim = new_sim(model, PRECISE);
+            host own = new_host();
+            if (by_host) {
+                assert_int_equal(gust_sim_set_sampled(sim, 0, step, &own), GUST_OK);
+            }
+            initialise(sim, 0.0);
+            loop at = START;
+            at.delay = delay;
+            for (int k = 0; k < 10; ++k) {
+                double row[4];
+                const double x = at.x;
+                sample(&at);
+                advance(sim, T * k + 0.5 * T);
+                gust_sim_channels(sim, row);
+                assert_true(by_host ? isnan(row[1])
+                                    : fabs(row[1] - x) < CLOSE && row[1] == (double)(float)row[1]);
+                at.x = after(&at, T);
+            }
+            gust_sim_destroy(&sim);
+            gust_model_destroy(&model);
+        }
+    }
+}
+
 /* The same law by the library and by the host: the same bits, also of rows and steps. */
 static void host_in_place(void **state)
 {
@@ -503,12 +539,14 @@ static void damaged(void **state)
         {"sampled.0.kind", 6, {0, 0, 0, 0, 4, -4}, "unknown kind"},
         {"sampled.0.kind", 5, {0, 0, 0, 0, 4}, "has 5 elements"},
         {"sampled.0.measurement", 6, {0, 2, 1, 1, 0, 1}, "\"x\" of the sampled block \"first\" does not exist"},
-        {"sampled.0.measurement", 6, {0, 0, 1, 1, 3, 1}, "\"double_x\" of the sampled block \"first\""},
+        {"sampled.0.measurement", 6, {0, 0, 1, 1, 4, 1}, "\"double_x\" of the sampled block \"first\""},
         {"sampled.0.measurement", 6, {0, 0, 1, 2, 0, 1}, "does not exist"},
         {"sampled.0.measurement", 6, {0, 0, 0, 1, 0, 1}, "does not exist"},
         {"sampled.0.measurement", 5, {0, 0, 1, 1, 0}, "too many values"},
         {"sampled.0.command", 1, {2}, "outside 0 ... 1"},
         {"sampled.0.command", 2, {0, 1}, "holds 1 texts, not 2"},
+        {"sampled.0.monitor", 1, {2}, "outside 0 ... 1"},
+        {"sampled.0.monitor", 2, {0, 1}, "holds 1 texts, not 2"},
     };
     for (size_t k = 0; k < sizeof INTEGERS / sizeof INTEGERS[0]; ++k) {
         good(&builder);
@@ -635,6 +673,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(closed_form),
         cmocka_unit_test(description),
+        cmocka_unit_test(monitor),
         cmocka_unit_test(host_in_place),
         cmocka_unit_test(without_library),
         cmocka_unit_test(host_fails),

@@ -120,6 +120,28 @@ CHANGES = {
 }
 
 
+@pytest.mark.parametrize("real", ["float", "double"])
+@pytest.mark.parametrize("source", ["measured", "estimated"])
+def test_a_schedule_in_the_controller_follows_the_wind(source: str, real: str) -> None:
+    """From 8 to 9 m/s in 10 s, through the bend at the highest speed; what it holds is told by the controller."""
+    changes = (
+        f"components.wt.schedule={{type: CurtailmentSchedule, wind_source: {source}, T_wind: 1 s}}",
+        "wind.wt={type: ramp, from: 8 m/s, to: 9 m/s, at: 1 s, duration: 10 s}",
+        "run.until=15 s",
+    )
+    channels = (OMEGA_R, V_DC, FREQUENCY, "wt.schedule.omega_del", "wt.schedule.beta_del")
+    one, other = (
+        case("DualPort", *changes, *more).run(channels, 5e-3, 15.0, rtol=1e-7)[1]
+        for more in ((), ("wt.control.sampled=1 ms", f"wt.control.real={real}"))
+    )
+    differences = [float(np.max(np.abs(one[name].astype(float) - other[name]))) for name in channels]
+    # The schedule tells of the sample before: 1 ms of the rates at which speed, 0.014 pu/s, and pitch, 2.3 deg/s, go.
+    for difference, bound in zip(differences, (6e-6, 1.2e-6, 5e-5, 3e-5, 5e-3), strict=True):
+        assert difference < bound
+    assert np.ptp(one["wt.schedule.omega_del"]) > 0.04
+    assert np.ptp(one["wt.schedule.beta_del"]) > 1.0
+
+
 @pytest.mark.parametrize("what", CHANGES)
 def test_changes_of_parameters_reach_the_controller(what: str) -> None:
     continuous = rows(case("DualPort", *CHANGES[what]), 6.0)

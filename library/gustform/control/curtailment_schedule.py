@@ -45,6 +45,10 @@ class CurtailmentSchedule(OperatingSchedule):
     The machine-side converter makes the rotor follow omega_del, so dv/dt costs power: 2 H omega_r d(omega_del)/dt,
     0.15 pu for 0.1 m/s per s below rated wind. T_wind keeps turbulence off the power.
 
+    Beside a sampled control the schedule is part of the exported controller, which then reads the wind: omega_del and
+    beta_del are what that controller tells of them. With `location: outside` it stays in the equations, as one that the
+    controller gets set points from.
+
     omega_del in pu of the turbine's base speed, beta_del in deg, wind in m/s. The tables default to those of the
     turbine's rotor and limits; limits of pitch and speed act behind this.
     Source: Lyu, Subotic, Gross 2022, IV-B, Fig. 4; observer: see WindObserver.
@@ -57,6 +61,14 @@ class CurtailmentSchedule(OperatingSchedule):
         structural=True,
         choices=("measured", "estimated"),
     )
+    location = Parameter(
+        "1",
+        "controller: part of an exported or sampled controller; outside: that controller reads omega_del and beta_del",
+        default="controller",
+        structural=True,
+        choices=("controller", "outside"),
+    )
+    sampled = Parameter("s", "sample period of the control; 0: in the equations", default=0.0, min=0.0, structural=True)
     curtailment = Parameter(
         "1", "share of the available power held back, 1 - eta", default=0.0, min=0.0, max=CURTAILMENT_MAX
     )
@@ -89,6 +101,9 @@ class CurtailmentSchedule(OperatingSchedule):
         x=lambda self: self.wind_point - self.source.gamma * self.omega_point,
     )
     v = Variable("m/s", "filtered wind speed", start=lambda self: self.wind_point, nominal=10.0)
+
+    def held(self) -> tuple[str, ...]:
+        return ("omega_del", "beta_del") if self.sampled > 0.0 and self.location == "controller" else ()
 
     def equations(self) -> None:
         source = self.source

@@ -184,6 +184,7 @@ class PmsgTurbine(Component):
         omega_point=lambda self: self.omega_del,
         beta_point=lambda self: self.beta_del - self.pitch_of_limiter(),
         wind_point=lambda self: self.wind_speed,
+        sampled=lambda self: self.control.sampled,
         curtailment=lambda self: self.control.curtailment,
         omega_max=lambda self: self.omega_max,
         omega_table=lambda self: speed_table(self.rotor, self.limits()),

@@ -1,4 +1,4 @@
-/* Plant x' = -a x + d with d held by a controller beside it. p: a (1/s). Outputs: 2 x, d, x'. */
+/* Plant x' = -a x + d with d held by a controller beside it. p: a (1/s). Outputs: 2 x, d, x', monitor. */
 #include "gustform/gust_kernel.h"
 
 static void prepare(const double *p, double *c)
@@ -26,6 +26,7 @@ static void outputs(const gust_point *at, double *value)
     value[0] = 2.0 * at->y[0];
     value[1] = at->d[1];
     value[2] = at->yp[0];
+    value[3] = at->d[0];
 }
 
 static const gust_kernel KERNEL = {.abi = GUST_KERNEL_ABI,
@@ -34,7 +35,7 @@ static const gust_kernel KERNEL = {.abi = GUST_KERNEL_ABI,
                                    .n_parameters = 1,
                                    .n_discrete = 2,
                                    .n_nonzeros = 1,
-                                   .n_outputs = 3,
+                                   .n_outputs = 4,
                                    .jacobian_row = ROW,
                                    .jacobian_column = COLUMN,
                                    .prepare = prepare,

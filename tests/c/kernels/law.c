@@ -1,5 +1,6 @@
 /* A controller as a library, float, period 0.1 s: u = -k x - s, s += i (2 x)/2, both inputs measured; bit 2
- * where u is beyond +-3 and cut to it, bit 3 after a calibration with a negative k. */
+ * where u is beyond +-3 and cut to it, bit 3 after a calibration with a negative k. It tells x as it has seen
+ * it. */
 #include <stddef.h>
 
 #include "gustform/gust_controller.h"
@@ -10,6 +11,7 @@ typedef struct law {
     float p[2];
     float gain[2];
     float memory[1];
+    float seen[1];
     uint32_t errors;
     uint32_t faulty;
 } law;
@@ -32,6 +34,7 @@ static uint32_t reinitialise(void *context)
     law *c = context;
     c->memory[0] = 0.0F;
     c->out[0] = 0.0F;
+    c->seen[0] = 0.0F;
     return c->errors;
 }
 
@@ -51,6 +54,7 @@ static uint32_t step(void *context)
     const float u = -c->gain[0] * c->in[0] - c->memory[0];
     c->memory[0] += c->gain[1] * 0.5F * c->in[1];
     c->errors &= 8U;
+    c->seen[0] = c->in[0];
     c->out[0] = u;
     if (u > 3.0F || u < -3.0F) {
         c->out[0] = u > 0.0F ? 3.0F : -3.0F;
@@ -66,9 +70,27 @@ static const gust_controller_signal OUTPUTS[] = {{"u", "V/s", 3, offsetof(law, o
 static const gust_controller_signal PARAMETERS[] = {
     {"k", "1/s", 4, offsetof(law, p), 0.0, 100.0, 1.0, 1.0},
     {"i", "1/s", 5, offsetof(law, p) + 4, 0.0, 100.0, 0.0, 1.0}};
-static const gust_controller CONTROLLER = {
-    GUST_CONTROLLER_VERSION, 4,      "law",   "Law",      0.1,     sizeof(law), 2,           1,           2,
-    offsetof(law, faulty),   INPUTS, OUTPUTS, PARAMETERS, startup, step,        recalibrate, reinitialise};
+static const gust_controller_signal MONITORS[] = {
+    {"seen", "V", 6, offsetof(law, seen), -100.0, 100.0, 0.0, 1.0}};
+static const gust_controller CONTROLLER = {GUST_CONTROLLER_VERSION,
+                                           4,
+                                           "law",
+                                           "Law",
+                                           0.1,
+                                           sizeof(law),
+                                           2,
+                                           1,
+                                           2,
+                                           1,
+                                           offsetof(law, faulty),
+                                           INPUTS,
+                                           OUTPUTS,
+                                           PARAMETERS,
+                                           MONITORS,
+                                           startup,
+                                           step,
+                                           recalibrate,
+                                           reinitialise};
 
 const gust_controller *gust_controller_interface(void)
 {

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from gustform_cli.hil.build import Options, build
+from gustform_cli.hil.build import build
 from gustform_cli.hil.rigs import SCENARIO
 from gustform_hil.rig_files import RigFiles, read_rig
+from tests.support.rigs import RIGS
 
 
 @pytest.fixture(scope="session")
@@ -20,17 +21,17 @@ def interface() -> str:
 
 @pytest.fixture(scope="session")
 def rig_for(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], RigFiles]:
-    """The rig of the load step at 8 m/s for a bus, "fd" or "classic"."""
+    """One of RIGS."""
     made: dict[str, RigFiles] = {}
 
-    def rig(bus: str) -> RigFiles:
-        if bus not in made:
+    def rig(name: str) -> RigFiles:
+        if name not in made:
             ready = os.environ.get("GUSTFORM_RIGS")
-            folder = Path(ready) / bus if ready else tmp_path_factory.mktemp("rig") / bus
+            folder = Path(ready) / name if ready else tmp_path_factory.mktemp("rig") / name
             if not ready:
-                build(SCENARIO, folder, Options(bus=bus))
-            made[bus] = read_rig(folder)
-        return made[bus]
+                build(SCENARIO, folder, RIGS[name])
+            made[name] = read_rig(folder)
+        return made[name]
 
     return rig
 

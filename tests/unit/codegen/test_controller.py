@@ -279,8 +279,9 @@ def test_a_library_is_known_by_its_interface(tmp_path: Path) -> None:
             *((n, ctypes.c_uint32) for n in ("version", "real_size")),
             *((n, ctypes.c_char_p) for n in ("name", "control")),
             ("period", ctypes.c_double),
-            *((n, ctypes.c_uint32) for n in ("context_size", "n_inputs", "n_outputs", "n_parameters", "faulty")),
-            *((n, ctypes.POINTER(Signal)) for n in ("inputs", "outputs", "parameters")),
+            ("context_size", ctypes.c_uint32),
+            *((n, ctypes.c_uint32) for n in ("n_inputs", "n_outputs", "n_parameters", "n_monitors", "faulty")),
+            *((n, ctypes.POINTER(Signal)) for n in ("inputs", "outputs", "parameters", "monitors")),
             *((n, call) for n in ("startup", "step", "recalibrate", "reinitialise")),
         ]
 
@@ -293,7 +294,7 @@ def test_a_library_is_known_by_its_interface(tmp_path: Path) -> None:
     library.gust_controller_interface.restype = ctypes.POINTER(Controller)
     one = library.gust_controller_interface().contents
     block = made.step.block
-    assert (one.version, one.real_size, one.name, one.control, one.period) == (1, 4, b"droop", b"Droop", 1e-3)
+    assert (one.version, one.real_size, one.name, one.control, one.period) == (2, 4, b"droop", b"Droop", 1e-3)
     assert [one.inputs[k].name.decode() for k in range(one.n_inputs)] == [s.name for s in block.inputs]
     assert [one.outputs[k].unit.decode() for k in range(one.n_outputs)] == [s.unit for s in block.outputs]
     assert [one.parameters[k].high for k in range(one.n_parameters)] == [s.high for s in made.step.parameters]

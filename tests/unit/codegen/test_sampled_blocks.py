@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from gustform.control.converter_control import ConverterControl
+from gustform.control.curtailment_schedule import CurtailmentSchedule
 from gustform.control.dual_port import DualPort
 from gustform.control.pitch import PitchControl
 from gustform.language import Discrete, Output
@@ -29,6 +30,8 @@ from gustform_codegen.emit.controller.program import Evaluator, program
 from gustform_codegen.flatten import flatten
 from gustform_codegen.initial import steady_state
 from gustform_codegen.sampled import continuous, library_sources
+from gustform_codegen.symbolic import key_of, keys_in
+from gustform_codegen.unit_type import UnitType
 from gustform_runtime import RunError, Simulation, Status
 from tests.physics.paper_system import paper_system
 from tests.support.case import SCENARIOS, Case, open_case
@@ -36,6 +39,8 @@ from tests.support.controller import CONTROLS
 
 ROOT = Path(__file__).resolve().parents[3]
 CHANNELS = ("sg.frequency", "wt.v_dc", "wt.omega_r", "wt.P_gsc", "wt.control.V_gsc")
+SCHEDULES = ["CurtailmentSchedule", "CurtailmentSchedule, wind_source: estimated"]
+WIND = "wind.wt={type: ramp, from: 8 m/s, to: 9 m/s, at: 0.2 s, duration: 1 s}"
 EARLY = "events=[{at: 0.5 s, set: {load.active: 120 MW}}]"
 
 
@@ -71,6 +76,26 @@ def test_no_equation_of_the_control_is_left() -> None:
     assert not any(path.startswith(("control.", "pitch.")) and not path.startswith("pitch.servo.") for path in paths)
 
 
+@pytest.mark.parametrize("source", ["measured", "estimated"])
+def test_a_schedule_leaves_the_equations_with_its_control(source: str) -> None:
+    """Or stays there, where it is outside of the controller."""
+
+    def plant(location: str) -> UnitType:
+        schedule = CurtailmentSchedule(wind_source=source, location=location)
+        return flatten(PmsgTurbine(control=DualPort(sampled=1e-3), schedule=schedule), frozenset({"frame"}))
+
+    inside, outside = plant("controller"), plant("outside")
+    states = {"schedule.v", "schedule.source.x"} if source == "estimated" else {"schedule.v"}
+    assert {u.path for u in outside.unknowns} - {u.path for u in inside.unknowns} == states
+    told = {"schedule.omega_del", "schedule.beta_del"}
+    assert {d.path for d in inside.discretes} - {d.path for d in outside.discretes} == told
+    assert not any(p.path.startswith("schedule.") for p in inside.parameters)
+    assert not [ref for ref in inside.tables if ref.owner.path.startswith("schedule")]
+    # What the controller tells of itself is no command: no equation has it.
+    symbols = {key_of(d.symbol) for d in inside.discretes if d.path in told}
+    assert all(symbols.isdisjoint(keys_in(row.expression)) for row in inside.rows)
+
+
 def test_the_header_of_the_runtime_is_that_of_the_export() -> None:
     assert (ROOT / "runtime" / "include" / "gustform" / "gust_controller.h").read_text() == HEADER.read_text()
 
@@ -78,23 +103,29 @@ def test_the_header_of_the_runtime_is_that_of_the_export() -> None:
 # ---- what is loaded ----
 
 
-@pytest.mark.parametrize("control", CONTROLS)
-def test_the_library_is_that_of_the_export(control: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("control", "schedule"), [*((c, "FixedPoint") for c in CONTROLS), *(("DualPort", s) for s in SCHEDULES)]
+)
+def test_the_library_is_that_of_the_export(control: str, schedule: str, tmp_path: Path) -> None:
     """The C beside the library that is loaded differs from the exported one in start and default values alone."""
-    chosen = f"components.wt.control={{type: {control}, sampled: 1 ms}}"
-    sampled = open_case("load_step_8ms", chosen).table.sampled
-    block = block_of_scenario("wt", SCENARIOS / "load_step_8ms.yaml", [chosen])
+    chosen = [
+        f"components.wt.control={{type: {control}, sampled: 1 ms}}",
+        f"components.wt.schedule={{type: {schedule}}}",
+    ]
+    sampled = open_case("load_step_8ms", *chosen).table.sampled
+    block = block_of_scenario("wt", SCENARIOS / "load_step_8ms.yaml", chosen)
     made = program(discretise(block, 1e-3))
     exported = source(made, Names(re.sub(r"(?<=[a-z])(?=[A-Z])", "_", control).lower(), False)).splitlines()
     loaded = Path(sampled.libraries[0]).with_suffix(".c").read_text().splitlines()
     assert len(exported) == len(loaded)
-    value = re.compile(r" *c->(in|out|p|memory)[.\[][a-zA-Z_0-9\]]+ = R\(.*\);")
+    value = re.compile(r" *c->(in|out|mon|p|memory)[.\[][a-zA-Z_0-9\]]+ = (R\(.*\)|\(-R\(.*\)\));")
     other = [(a, b) for a, b in zip(exported, loaded, strict=True) if a != b]
     assert all(value.fullmatch(a) and value.fullmatch(b) for a, b in other)
     # And the values themselves are those of the export.
     found = sampled.blocks[0]
     assert found.measurement_names == [s.name for s in block.inputs]
     assert found.command_names == [s.name for s in block.outputs]
+    assert found.monitor_names == [s.name for s in block.monitors]
     np.testing.assert_array_equal(found.parameters, [p.value for p in made.step.parameters])
     np.testing.assert_allclose(found.states, [s.value for s in block.states], rtol=1e-8, atol=1e-9)
 
@@ -109,7 +140,7 @@ def test_number_type(real: str) -> None:
     library: Any = ctypes.CDLL(found.libraries[0])
     library.gust_controller_interface.restype = ctypes.POINTER(_Descriptor)
     descriptor = library.gust_controller_interface().contents
-    assert (descriptor.version, descriptor.name) == (1, b"dual_port")
+    assert (descriptor.version, descriptor.name) == (2, b"dual_port")
     assert descriptor.real_size == found.blocks[0].real_size == {"float": 4, "double": 8}[real]
 
 
@@ -170,22 +201,28 @@ def test_systems_without_samples_are_as_they_were(cache: KernelCache) -> None:
 # ---- the host in place of the library ----
 
 
-def test_casadi_in_place_of_the_library_gives_the_same_bits() -> None:
-    """The step as CasADi evaluates it, made by the export, called back at each sample: the run is that of the C."""
-    changes = ("wt.control.real=double", EARLY)
+@pytest.mark.parametrize("schedule", ["FixedPoint", *SCHEDULES])
+def test_casadi_in_place_of_the_library_gives_the_same_bits(schedule: str) -> None:
+    """The step as CasADi evaluates it, made by the export, called back at each sample: the run is that of the C. What
+    the controller tells of its schedule is told by the C alone."""
+    changes = ("wt.control.real=double", f"components.wt.schedule={{type: {schedule}}}", WIND, EARLY)
     found = case(*changes)
     block = block_of_scenario("wt", SCENARIOS / "load_step_8ms.yaml", ["wt.control.sampled=1 ms", *changes])
     oracle = Evaluator(program(discretise(block, 1e-3)))
     times: list[float] = []
+    monitors: list[Any] = []
 
     def step(time: float, measured: Any) -> Any:
         times.append(time)
-        return oracle.step(measured)[0]
+        commands, _ = oracle.step(measured)
+        monitors.append(oracle.monitors)
+        return commands
 
     results = []
+    told = tuple(f"wt.schedule.{s.name}" for s in block.monitors)
     for by_host in (False, True):
         rows: list[Any] = []
-        with found.simulation(CHANNELS, rtol=1e-7) as simulation:
+        with found.simulation((*CHANNELS, *told), rtol=1e-7) as simulation:
             simulation.set_sink(1e-3, collector(rows))
             if by_host:
                 simulation.set_sampled(0, step)
@@ -194,10 +231,14 @@ def test_casadi_in_place_of_the_library_gives_the_same_bits() -> None:
             results.append((np.concatenate(rows), simulation.statistics(), simulation.state()[1]))
     np.testing.assert_allclose(times, 1e-3 * np.arange(2000), rtol=1e-12, atol=0.0)
     (a, effort_a, y_a), (b, effort_b, y_b) = results
-    assert np.array_equal(a, b)
+    n = len(CHANNELS)
+    assert np.array_equal(a[:, :n], b[:, :n])
+    assert np.isnan(b[:, n:]).all()
+    assert np.array_equal(a[1 : len(monitors), n:], np.array(monitors[:-1], np.float32))  # rows are before the sample
     assert effort_a == effort_b
     assert np.array_equal(y_a, y_b)
     assert np.ptp(a[:, 0]) > 0.05
+    assert (len(told) == 2) == (schedule != "FixedPoint")
 
 
 def test_a_host_that_fails_is_raised() -> None:
@@ -316,6 +357,9 @@ def test_half_a_controller_is_refused(cache: KernelCache) -> None:
     system = paper_system(8.0)
     system.components["wt"] = PmsgTurbine(control=DualPort(sampled=1e-3), pitch=PitchControl())
     with pytest.raises(GustformError, match=r"GF4105: .*both controls are one controller"):
+        build(system, cache)
+    system.components["wt"] = PmsgTurbine(schedule=CurtailmentSchedule(sampled=1e-3))
+    with pytest.raises(GustformError, match=r"GF4105: .*schedule.sampled = 0.001 s, .*both are one controller"):
         build(system, cache)
 
 

@@ -22,7 +22,7 @@ def _text(words: str) -> str:
 def offsets(program: Program, size: int) -> dict[str, int]:
     """Where each member stands in the context, bytes; `size` of a number. The order is that of the header."""
     block, step = program.step.block, program.step
-    members = [("in", block.inputs), ("out", block.outputs), ("p", step.parameters)]
+    members = [("in", block.inputs), ("out", block.outputs), ("mon", block.monitors), ("p", step.parameters)]
     names = [f"{place}.{s.name}" for place, signals in members for s in signals]
     result = {name: size * k for k, name in enumerate(names)}
     words = len(names) + max(program.n_constants, 1) + max(len(step.memory), 1)
@@ -35,7 +35,7 @@ def a2l(program: Program, names: Names) -> str:
     size = 8 if names.double else 4
     kind = f"FLOAT{8 * size}_IEEE"
     at = offsets(program, size)
-    signals = [*block.inputs, *block.outputs, *step.parameters]
+    signals = [*block.inputs, *block.outputs, *block.monitors, *step.parameters]
     units = list(dict.fromkeys(s.unit for s in signals))
 
     def limits(s: Signal) -> str:
@@ -63,7 +63,7 @@ def a2l(program: Program, names: Names) -> str:
         f"{limits(s)} /end CHARACTERISTIC"
         for s in step.parameters
     ]
-    for place, some in (("in", block.inputs), ("out", block.outputs)):
+    for place, some in (("in", block.inputs), ("out", block.outputs), ("mon", block.monitors)):
         lines += [
             f"    /begin MEASUREMENT {place}.{s.name} {_text(s.description)} {kind} {unit(s)} 0 0 {limits(s)} "
             f"ECU_ADDRESS 0x{at[f'{place}.{s.name}']:X} /end MEASUREMENT"

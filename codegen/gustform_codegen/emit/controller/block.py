@@ -5,7 +5,8 @@
 It is made from the declarations alone, by `flatten` of the control as a unit. Two components make one controller: the
 control of both converters and the pitch control, whose demand `beta_ref` is the output. A schedule makes a third, which
 gives the other two their operating point from tables. What no output depends on is left out: the pitch servo, which is
-plant; a measurement that the control does not read.
+plant; a measurement that the control does not read. What the schedule gives can be looked at as well: monitors, which
+nobody is commanded by.
 """
 
 from __future__ import annotations
@@ -31,7 +32,8 @@ _PITCH_OUTPUT = "beta_ref"
 class Block:
     """dx/dt = rates(x, u, p); y = results(x, u, p); all SX in the symbols of states, inputs and parameters.
 
-    `calls` are the look-ups in `tables` that they contain, in an order in which they can be evaluated.
+    `results` are the outputs and, behind them, the monitors. `calls` are the look-ups in `tables` that they contain, in
+    an order in which they can be evaluated.
     """
 
     name: str
@@ -44,6 +46,7 @@ class Block:
     parameters: list[Signal]
     tables: list[Grid] = field(default_factory=list)
     calls: list[Call] = field(default_factory=list)
+    monitors: list[Signal] = field(default_factory=list)
 
 
 def controller_block(
@@ -64,10 +67,11 @@ def controller_block(
         Piece(pitch, "pitch", _RENAMED, [_PITCH_OUTPUT], values),
     ]
     given: dict[str, Any] = {}
+    monitors: list[Signal] = []
     if schedule is not None:
         part = Piece(schedule, "schedule", _RENAMED, list(type(schedule).declared(Output)), values)
         given = {s.name: result for s, result in zip(part.outputs, part.results, strict=True)}
-        part.outputs, part.results = [], []
+        monitors, part.outputs, part.results = part.outputs, [], []
         parts.append(part)
     inputs: dict[str, Signal] = {}
     same, point = Substitution(), Substitution()
@@ -86,7 +90,7 @@ def controller_block(
     states = [s for part in parts for s in part.states]
     rates = joined([r for part in parts for r in part.rates])
     outputs = [s for part in parts for s in part.outputs]
-    results = joined([r for part in parts for r in part.results])
+    results = joined([*(r for part in parts for r in part.results), *given.values()])
     tables = [grid for part in parts for grid in part.tables]
     calls = []
     for part in parts:
@@ -110,6 +114,7 @@ def controller_block(
         [s for part in parts for s in part.parameters if key_of(s.symbol) in used],
         [tables[k] for k in looked_up],
         [replace(call, table=looked_up.index(call.table)) for call in calls],
+        monitors,
     )
 
 

@@ -78,6 +78,7 @@ typedef float {p}_real;
 #define {upper}_PERIOD {step.period!r} /* s */
 #define {upper}_N_INPUTS {len(block.inputs)}
 #define {upper}_N_OUTPUTS {len(block.outputs)}
+#define {upper}_N_MONITORS {len(block.monitors)}
 #define {upper}_N_PARAMETERS {len(step.parameters)}
 #define {upper}_N_CONSTANTS {program.n_constants}
 #define {upper}_N_MEMORY {len(step.memory)}
@@ -92,11 +93,14 @@ typedef float {p}_real;
 
     lines += struct(block.inputs, "inputs", "What is measured, and the operating point.")
     lines += struct(block.outputs, "outputs", "What is commanded; always finite and within its range.")
+    if block.monitors:
+        lines += struct(block.monitors, "monitors", "To be looked at; nothing is commanded by it. Always finite.")
     lines += struct(step.parameters, "parameters", "Read by startup and recalibrate only.")
     lines += f"""
 typedef struct {p}_context {{
     {p}_inputs in;
     {p}_outputs out;
+@monitors@
     {p}_parameters p;
     {p}_real constant[{max(program.n_constants, 1)}]; /* of the last good calibration */
     {p}_real memory[{max(len(step.memory), 1)}];
@@ -122,4 +126,6 @@ uint32_t {p}_reinitialise({p}_context *c);
 
 #endif
 """.splitlines()
+    at = lines.index("@monitors@")
+    lines[at : at + 1] = [f"    {p}_monitors mon;"] if block.monitors else []
     return "\n".join(lines) + "\n"

@@ -25,6 +25,7 @@ def describe(program: Program, names: Names) -> dict[str, Any]:
         "inputs": ("in", block.inputs),
         "outputs": ("out", block.outputs),
         "parameters": ("p", step.parameters),
+        "monitors": ("mon", block.monitors),
     }
     result: dict[str, Any] = {
         "format": "gustform controller 1",

@@ -148,6 +148,13 @@ def _tables(program: Program) -> list[str]:
     ]
 
 
+def _monitors(signals: list[Signal]) -> list[str]:
+    if not signals:
+        return []
+    text = "To be looked at, for a log or a calibration tool: nothing is commanded by them. Members of `mon`."
+    return ["## Monitors", "", *_rows(signals, "start"), "", text, ""]
+
+
 def _readme(program: Program, names: Names) -> str:
     block, step, p, upper = program.step.block, program.step, names.prefix, names.upper
     warped = [f"- `{name}` is pre-warped at {w:.4g} rad/s." for name, w in step.prewarped.items()]
@@ -198,6 +205,7 @@ def _readme(program: Program, names: Names) -> str:
         "",
         "Always finite and within the range, from startup on.",
         "",
+        *_monitors(block.monitors),
         "## Parameters",
         "",
         *_rows(step.parameters, "default"),

@@ -16,7 +16,7 @@
 extern "C" {
 #endif
 
-#define GUST_CONTROLLER_VERSION 1
+#define GUST_CONTROLLER_VERSION 2
 
 typedef struct gust_controller_signal {
     const char *name;
@@ -39,10 +39,12 @@ typedef struct gust_controller {
     uint32_t n_inputs;
     uint32_t n_outputs;
     uint32_t n_parameters;
+    uint32_t n_monitors;
     uint32_t faulty_inputs; /* offset of the word that tells which inputs were rejected */
     const gust_controller_signal *inputs;
     const gust_controller_signal *outputs;
     const gust_controller_signal *parameters;
+    const gust_controller_signal *monitors; /* to be looked at; nothing is commanded by them */
     uint32_t (*startup)(void *context);
     uint32_t (*step)(void *context);
     uint32_t (*recalibrate)(void *context);

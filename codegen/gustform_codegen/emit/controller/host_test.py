@@ -115,7 +115,7 @@ static void check_interface({p}_context *direct, {p}_context *c)
     int i = 0;
     uint32_t k = 0U;
 
-    expect(controller->version == 1U && controller->real_size == sizeof({p}_real)
+    expect(controller->version == GUST_CONTROLLER_VERSION && controller->real_size == sizeof({p}_real)
                && controller->context_size == sizeof *c,
            "the interface is that of the context");
     (void){p}_startup(direct);

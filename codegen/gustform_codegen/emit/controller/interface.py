@@ -44,7 +44,12 @@ extern const gust_controller {p}_controller;
 def interface_source(program: Program, names: Names) -> str:
     """<name>_interface.c."""
     block, step, p, upper = program.step.block, program.step, names.prefix, names.upper
-    kinds = (("inputs", "in", block.inputs), ("outputs", "out", block.outputs), ("parameters", "p", step.parameters))
+    kinds = (
+        ("inputs", "in", block.inputs),
+        ("outputs", "out", block.outputs),
+        ("parameters", "p", step.parameters),
+        ("monitors", "mon", block.monitors),
+    )
     tables = "\n".join(_table(p, kind, member, signals) for kind, member, signals in kinds if signals)
     calls = "\n".join(_wrapper(p, call) for call in _CALLS)
     pointers = ",\n".join(f"    {f'{kind}_table' if signals else 'NULL'}" for kind, _, signals in kinds)
@@ -71,6 +76,7 @@ const gust_controller {p}_controller = {{
     {upper}_N_INPUTS,
     {upper}_N_OUTPUTS,
     {upper}_N_PARAMETERS,
+    {upper}_N_MONITORS,
     (uint32_t)offsetof({p}_context, faulty_inputs),
 {pointers},
 {functions}

@@ -45,7 +45,7 @@ class LookUp:
 
 @dataclass(frozen=True, eq=False)
 class Program:
-    """prepare: (p) -> c; advance: (memory, u, c, t) -> memory+ and y in one vector; no t without look-ups."""
+    """prepare: (p) -> c; advance: (memory, u, c, t) -> memory+, y and monitors in one vector; no t without look-ups."""
 
     step: Step
     prepare: Any
@@ -159,7 +159,7 @@ def _identity(value: Any) -> object:
 class Evaluator:
     """The controller by CasADi in double, with the checks of the C: the oracle for it, and the source of its vectors.
 
-    `step` returns the outputs and whether the sample was accepted.
+    `step` returns the outputs and whether the sample was accepted; `monitors` are those of the last accepted one.
     """
 
     def __init__(self, program: Program) -> None:
@@ -172,6 +172,7 @@ class Evaluator:
         self.calibrate(np.array([s.value for s in program.step.parameters]))
         self.memory = np.array([s.value for s in block.states])
         self.outputs = np.clip(np.array([s.value for s in block.outputs]), self.out_low, self.out_high)
+        self.monitors = np.array([s.value for s in block.monitors])
 
     def calibrate(self, parameters: Array) -> None:
         """Constants from parameters, in the order of `program.step.parameters`."""
@@ -184,8 +185,10 @@ class Evaluator:
             known = [self.memory, inputs, self.constants, *self._look_up(inputs)]
             found = np.asarray(self.program.advance(*known)).ravel()
             n = self.memory.size
-            self.memory = found[:n]
-            self.outputs = np.minimum(np.maximum(found[n:], self.out_low), self.out_high)
+            self.memory, found = found[:n], found[n:]
+            n = self.outputs.size
+            self.outputs = np.minimum(np.maximum(found[:n], self.out_low), self.out_high)
+            self.monitors = found[n:]
         return self.outputs.copy(), good
 
     def _look_up(self, inputs: Array) -> list[Array]:
