@@ -109,11 +109,21 @@ def test_a_curtailment_schedule_is_exported_with_its_tables(tmp_path: Path) -> N
     assert "schedule_omega_table" in (tmp_path / "rig" / "README.md").read_text()
     memory = json.loads((tmp_path / "rig" / "footprint.json").read_text())
     assert all((m["data"], m["bss"]) == (0, 0) for m in memory)
-    done = export("wt", str(LOAD_STEP), "--out", "bare", "--no-schedule", *chosen, cwd=tmp_path)
+    assert [m["c"] for m in found["monitors"]] == ["mon.omega_del", "mon.beta_del"]
+    a2l = (tmp_path / "rig" / "dual_port.a2l").read_text()
+    header = (tmp_path / "rig" / "dual_port.h").read_text()
+    assert "MEASUREMENT mon.omega_del" in a2l
+    assert "dual_port_monitors mon;" in header
+    outside = ["--set", "components.wt.schedule={type: CurtailmentSchedule, location: outside}"]
+    for words in (["--no-schedule", *chosen], outside):
+        done = export("wt", str(LOAD_STEP), "--out", "bare", *words, cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+        bare = json.loads((tmp_path / "bare" / "dual_port.json").read_text())
+        assert {"omega_del", "beta_del"} <= {s["name"] for s in bare["inputs"]}
+        assert bare["tables"] == bare["monitors"] == []
+    done = export("wt", str(LOAD_STEP), "--out", "with", "--schedule", *outside, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    found = json.loads((tmp_path / "bare" / "dual_port.json").read_text())
-    assert {"omega_del", "beta_del"} <= {s["name"] for s in found["inputs"]}
-    assert found["tables"] == []
+    assert json.loads((tmp_path / "with" / "dual_port.json").read_text()) == found
 
 
 @pytest.mark.parametrize(
