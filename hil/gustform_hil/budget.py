@@ -4,7 +4,8 @@ The deadline of a message is the distance of two of its frames: the next one sha
 Messages on events have none in the database; theirs is assumed, and the report says so. All messages of a database
 count, whether a mapping uses them or not: they share the bus.
 
-GF8120 bit rate; GF8121 bus overloaded; GF8122 deadline missed; GF8123 time of an option; GF8124 length of a frame.
+GF8120 bit rate; GF8121 bus overloaded; GF8122 deadline missed; GF8123 time of an option; GF8124 length of a frame;
+GF8125 sender of an option.
 """
 
 from __future__ import annotations
@@ -16,17 +17,27 @@ from typing import Any
 
 from gustform.language.errors import GustformError
 from gustform_hil.frame_time import FD_LENGTHS, BitRates, frame_bits
+from gustform_hil.message_set import MessageSet, Part
 from gustform_hil.response_time import Bus, Traffic, load, response_times
 
 NOMINAL_RATES = (125_000, 250_000, 500_000, 1_000_000)
 DATA_RATES = (1_000_000, 2_000_000, 4_000_000, 5_000_000, 8_000_000)
 EVENT_DISTANCE = Fraction(10, 1000)
+# Those of bridge.c that take turns.
+_SLOW = (
+    Part.CONTROLLER_STATE,
+    Part.PARAMETER_RESPONSE,
+    Part.CONTROLLER_HEARTBEAT,
+    Part.CONTROLLER_FINGERPRINT,
+)
 _ZERO = Fraction(0)
+_AND = ", "  # between the senders of a message
 
 
 @dataclass(frozen=True)
 class Frame:
-    """What the bus sees of a message. `distance`, s: of two frames, at least; `event`: not cyclic, so it is assumed."""
+    """What the bus sees of a message. `distance`, s: of two frames, at least; `event`: not cyclic, so it is assumed;
+    `paced`, s: of any two of those frames of its sender that are paced, None if it is not."""
 
     name: str
     sender: str
@@ -36,6 +47,7 @@ class Frame:
     length: int
     distance: Fraction
     event: bool
+    paced: Fraction | None = None
 
     @property
     def urgency(self) -> tuple[int, int, int]:
@@ -47,10 +59,12 @@ class Frame:
 
 @dataclass(frozen=True)
 class Assumptions:
-    """About senders and wire: every frame may be queued `jitter` s late; one error per `error_interval` s, or none."""
+    """About senders and wire: every frame may be queued `jitter` s late; one error per `error_interval` s, or none. The
+    senders of each of `queues` share an interface with a plain queue; all others offer what is most urgent."""
 
     jitter: Fraction = _ZERO
     error_interval: Fraction | None = None
+    queues: tuple[frozenset[str], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -94,20 +108,47 @@ class Budget:
 
 
 def budget(name: str, frames: Sequence[Frame], rates: BitRates, assumptions: Assumptions | None = None) -> Budget:
-    """Times of all messages. GF8120 for rates that no bus has."""
+    """Times of all messages. GF8120 for rates that no bus has, GF8125 for queues of unknown senders."""
     _check_rates(rates)
     assumed = assumptions or Assumptions()
+    _check_queues(frames, assumed.queues)
     ordered = sorted(frames, key=lambda frame: frame.urgency)
     traffic = [
-        Traffic(f.name, _time(f, rates), f.distance, f.distance, assumed.jitter)
+        Traffic(
+            name=f.name,
+            time=_time(f, rates),
+            period=f.distance,
+            deadline=f.distance,
+            jitter=assumed.jitter,
+            queue=_queue(f, assumed.queues),
+            sender=f.sender,
+            paced=f.paced,
+        )
         for f in ordered
-    ]  # fmt: skip
+    ]
     bus = Bus(Fraction(1, rates.nominal), assumed.error_interval)
     rows = (
         Row(frame, t.time, response)
         for frame, t, response in zip(ordered, traffic, response_times(traffic, bus), strict=True)
     )
     return Budget(name, rates, assumed, load(traffic), tuple(rows))
+
+
+def _queue(frame: Frame, queues: Sequence[frozenset[str]]) -> str | None:
+    """The plain queue that a frame waits in, by a name."""
+    senders = set(frame.sender.split(_AND))
+    return next(("+".join(sorted(queue)) for queue in queues if senders & queue), None)
+
+
+def _check_queues(frames: Sequence[Frame], queues: Sequence[frozenset[str]]) -> None:
+    known = {sender for f in frames for sender in f.sender.split(_AND)}
+    named = [sender for queue in queues for sender in sorted(queue)]
+    for sender in named:
+        if sender not in known or named.count(sender) > 1:
+            what = "is no sender of the database" if sender not in known else "can have one queue only"
+            raise GustformError(
+                "GF8125", f"{sender!r} {what}; there are {', '.join(sorted(known))}", hint="--fifo CTRL"
+            )
 
 
 def _time(frame: Frame, rates: BitRates) -> Fraction:
@@ -193,14 +234,25 @@ def _ms(seconds: Fraction) -> str:
 
 
 def frames_of(
-    messages: Sequence[Any], event_distance: Fraction = EVENT_DISTANCE, cycles: Mapping[str, Fraction] | None = None
+    messages: Sequence[Any],
+    event_distance: Fraction = EVENT_DISTANCE,
+    cycles: Mapping[str, Fraction] | None = None,
+    paced: Mapping[str, Fraction] | None = None,
 ) -> list[Frame]:
     """What the bus sees of the messages of a cantools database: `event_distance`, s, is that of messages on events,
-    `cycles` are those that a mapping gives in place of the database's. GF8124."""
-    return [_frame(message, event_distance, (cycles or {}).get(message.name)) for message in messages]
+    `cycles` are those that a mapping gives in place of the database's, `paced` see `paced_by_the_bridge`. GF8124."""
+    cycles, paced = cycles or {}, paced or {}
+    return [_frame(message, event_distance, cycles.get(message.name), paced.get(message.name)) for message in messages]
 
 
-def _frame(message: Any, event_distance: Fraction, mapped: Fraction | None) -> Frame:
+def paced_by_the_bridge(messages: MessageSet) -> dict[str, Fraction]:
+    """What a gust-bridge sends besides references: one of these messages in each of its periods, which is in s."""
+    references = messages.find(Part.REFERENCES)
+    slow = [message.name for part in _SLOW for message in messages.pieces(part)]
+    return {} if references is None else dict.fromkeys(slow, Fraction(references.cycle, 1_000_000))
+
+
+def _frame(message: Any, event_distance: Fraction, mapped: Fraction | None, paced: Fraction | None) -> Frame:
     cycle = Fraction(message.cycle_time or 0) / 1000 if mapped is None else mapped
     if not message.is_fd and message.length > 8:
         raise GustformError(
@@ -210,11 +262,12 @@ def _frame(message: Any, event_distance: Fraction, mapped: Fraction | None) -> F
         )
     return Frame(
         name=message.name,
-        sender=", ".join(message.senders) or "anyone",
+        sender=_AND.join(message.senders) or "anyone",
         identifier=message.frame_id,
         extended=message.is_extended_frame,
         fd=message.is_fd,
         length=message.length,
         distance=cycle or event_distance,
         event=not cycle,
+        paced=paced,
     )

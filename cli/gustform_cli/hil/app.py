@@ -53,6 +53,13 @@ def budget(
     errors_every: Annotated[
         str | None, typer.Option(metavar="TIME", help="least distance of two errors on the wire [no errors]")
     ] = None,
+    fifo: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="SENDER",
+            help="a sender with a plain queue, as in Linux, A+B: on one interface; more than once for several",
+        ),
+    ] = None,
     every_rate: Annotated[bool, typer.Option("--all", help="one line for each usual pair of bit rates")] = False,
     json: Json = False,
 ) -> None:
@@ -61,7 +68,9 @@ def budget(
         from gustform_cli.hil import budget as budgets
         from gustform_hil.budget import refuse
 
-        request = budgets.Request(bus.value, dbc, mapping, bitrate, data_bitrate, event_distance, jitter, errors_every)
+        request = budgets.Request(
+            bus.value, dbc, mapping, bitrate, data_bitrate, event_distance, jitter, errors_every, fifo or ()
+        )
         if every_rate:
             found = budgets.survey(request)
             print(budgets.survey_json(found) if json else budgets.survey_text(found))

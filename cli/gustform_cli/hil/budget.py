@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -19,6 +20,7 @@ from gustform_hil.budget import (
     Row,
     budget,
     frames_of,
+    paced_by_the_bridge,
     rate_text,
     rates_text,
 )
@@ -51,6 +53,7 @@ class Request:
     event_distance: str = "10 ms"
     jitter: str = "0"
     errors_every: str | None = None
+    fifo: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
@@ -67,16 +70,18 @@ def traffic(request: Request) -> Traffic:
     file, mapping = request.dbc, request.mapping
     if file is None:
         file, mapping = shipped_files(request.bus)
-    mapped = load_message_set(file, mapping).messages if mapping is not None else ()
-    cycles = {message.name: Fraction(message.cycle, 1_000_000) for message in mapped}
+    mapped = None if mapping is None else load_message_set(file, mapping)
+    cycles = {} if mapped is None else {m.name: Fraction(m.cycle, 1_000_000) for m in mapped.messages}
+    paced = {} if mapped is None else paced_by_the_bridge(mapped)
     distance = _time(request.event_distance, "--event-distance", least=1e-4)
     assumed = Assumptions(
         jitter=_time(request.jitter, "--jitter", least=0.0),
         error_interval=None
         if request.errors_every is None
         else _time(request.errors_every, "--errors-every", least=1e-4),
+        queues=tuple(frozenset(text.split("+")) for text in request.fifo),
     )
-    return Traffic(file.stem, frames_of(read_dbc(file).database.messages, distance, cycles), assumed)
+    return Traffic(file.stem, frames_of(read_dbc(file).database.messages, distance, cycles, paced), assumed)
 
 
 def budget_of(request: Request) -> Budget:
@@ -114,6 +119,12 @@ def as_text(found: Budget) -> str:
     if any(row.frame.event for row in found.rows):
         lines.append("event: not cyclic; that two of them are as far apart as this is assumed (--event-distance)")
     said = found.assumptions
+    if any(row.frame.paced is not None for row in found.rows):
+        lines.append("the bridge sends one of its slow messages in each period; response: with their turns")
+    lines += [
+        f"{' and '.join(sorted(queue))}: a plain queue, whose frames leave in the order in which they were handed over"
+        for queue in said.queues
+    ]
     if said.jitter:
         lines.append(f"each frame up to {float(said.jitter) * 1e3:g} ms late in its queue")
     if said.error_interval is not None:
@@ -151,6 +162,7 @@ def _as_data(found: Budget) -> dict[str, object]:
         {
             "name": row.frame.name, "id": row.frame.identifier, "sender": row.frame.sender, "fd": row.frame.fd,
             "length": row.frame.length, "event": row.frame.event, "frame_s": float(row.time),
+            "paced_s": None if row.frame.paced is None else float(row.frame.paced),
             "period_s": float(row.frame.distance), "deadline_s": float(row.deadline),
             "response_s": None if row.response is None else float(row.response), "fits": row.fits,
         }
@@ -161,6 +173,7 @@ def _as_data(found: Budget) -> dict[str, object]:
         "bitrate": found.rates.nominal,
         "data_bitrate": found.rates.data if found.fd else None,
         "load": float(found.load),
+        "fifo": [sorted(queue) for queue in found.assumptions.queues],
         "fits": found.fits,
         "messages": messages,
     }

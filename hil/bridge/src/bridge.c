@@ -16,6 +16,11 @@
 static const gust_part INPUT_PARTS[] = {GUST_PART_MEASUREMENTS, GUST_PART_SET_POINTS};
 static const gust_part OUTPUT_PARTS[] = {GUST_PART_REFERENCES};
 
+/* Those that take turns. */
+static const gust_part TURNS[GUST_TURNS] = {GUST_PART_CONTROLLER_STATE, GUST_PART_PARAMETER_RESPONSE,
+                                            GUST_PART_CONTROLLER_HEARTBEAT, GUST_PART_CONTROLLER_FINGERPRINT};
+enum { TURN_OF_STATE = 0, TURN_OF_ANSWER = 1 };
+
 const gust_rate gust_default_rates[] = {{"v_dc", 500.0}, {"omega_r", 5.0}};
 const uint32_t gust_n_default_rates = sizeof gust_default_rates / sizeof gust_default_rates[0];
 
@@ -363,12 +368,8 @@ static void send_or_wait(gust_bridge *bridge)
     send_references(bridge);
 }
 
-static void send_status(gust_bridge *bridge, gust_part part, uint32_t periods, bool now)
+static void send_status(gust_bridge *bridge, const gust_message *message)
 {
-    const gust_message *message = gust_message_find(bridge->config.messages, part, 0);
-    if (message == NULL || !(gust_link_due(&bridge->link, message, periods) || now)) {
-        return;
-    }
     double values[GUST_MESSAGE_SIGNALS];
     uint32_t cut = 0;
     fill(bridge, message, false, atomic_load(&bridge->sample), values);
@@ -381,12 +382,9 @@ static void send_status(gust_bridge *bridge, gust_part part, uint32_t periods, b
     gust_bridge_transport(bridge, gust_link_send(&bridge->link, message, values, &cut));
 }
 
-static void answer_parameters(gust_bridge *bridge)
+/* `message` NULL: the request is carried out all the same. */
+static void answer_parameters(gust_bridge *bridge, const gust_message *message)
 {
-    const gust_message *message = gust_message_find(bridge->config.messages, GUST_PART_PARAMETER_RESPONSE, 0);
-    if (!bridge->parameters.request.asked) {
-        return;
-    }
     const gust_result result =
         gust_parameters_answer(&bridge->parameters, bridge->context, bridge->supervision.state);
     if (message == NULL) {
@@ -400,6 +398,56 @@ static void answer_parameters(gust_bridge *bridge)
     gust_link_put(message, values, GUST_FIELD_VALUE, bridge->parameters.request.value);
     gust_link_put(message, values, GUST_FIELD_RESULT, (double)result);
     gust_bridge_transport(bridge, gust_link_send(&bridge->link, message, values, &cut));
+}
+
+static void want(gust_bridge *bridge, uint32_t periods)
+{
+    const gust_supervision *s = &bridge->supervision;
+    for (uint32_t k = 0; k < GUST_TURNS; ++k) {
+        const gust_message *message = gust_message_find(bridge->config.messages, TURNS[k], 0);
+        if (message != NULL && gust_link_due(&bridge->link, message, periods)) {
+            bridge->wanted[k] = true;
+        }
+    }
+    if (bridge->parameters.request.asked) {
+        bridge->wanted[TURN_OF_ANSWER] = true;
+    }
+    if (s->state != bridge->told_state || s->faults != bridge->told_faults) {
+        bridge->wanted[TURN_OF_STATE] = true;
+        bridge->turn = TURN_OF_STATE;
+    }
+    bridge->told_state = s->state;
+    bridge->told_faults = s->faults;
+}
+
+/* Whether everything has left that was handed over before this period. */
+static bool quiet(gust_bridge *bridge)
+{
+    gust_transport *transport = bridge->config.transport;
+    if (transport->pending(transport) > 0 && ++bridge->unquiet <= bridge->config.limits.missing) {
+        return false;
+    }
+    bridge->unquiet = 0;
+    return true;
+}
+
+static void send_next(gust_bridge *bridge)
+{
+    for (uint32_t n = 0; n < GUST_TURNS; ++n) {
+        const uint32_t k = (bridge->turn + n) % GUST_TURNS;
+        if (!bridge->wanted[k]) {
+            continue;
+        }
+        const gust_message *message = gust_message_find(bridge->config.messages, TURNS[k], 0);
+        bridge->wanted[k] = false;
+        bridge->turn = k + 1U;
+        if (k == TURN_OF_ANSWER) {
+            answer_parameters(bridge, message);
+        } else if (message != NULL) {
+            send_status(bridge, message);
+        }
+        return;
+    }
 }
 
 /* ---- A period ---- */
@@ -467,21 +515,22 @@ void gust_bridge_tick(gust_bridge *bridge, uint32_t periods)
     } else if (s->state == GUST_STATE_RUN) {
         ++bridge->held;
     }
+    const bool others_may = quiet(bridge);
     send_or_wait(bridge);
-    answer_parameters(bridge);
-    const bool changed = s->state != bridge->told_state || s->faults != bridge->told_faults;
-    bridge->told_state = s->state;
-    bridge->told_faults = s->faults;
-    send_status(bridge, GUST_PART_CONTROLLER_STATE, periods, changed);
-    send_status(bridge, GUST_PART_CONTROLLER_HEARTBEAT, periods, false);
-    send_status(bridge, GUST_PART_CONTROLLER_FINGERPRINT, periods, false);
+    want(bridge, periods);
+    if (others_may) {
+        send_next(bridge);
+    }
 }
 
 void gust_bridge_stop(gust_bridge *bridge)
 {
     bridge->supervision.state = GUST_STATE_SAFE;
     send_references(bridge);
-    send_status(bridge, GUST_PART_CONTROLLER_STATE, 1, true);
+    const gust_message *state = gust_message_find(bridge->config.messages, GUST_PART_CONTROLLER_STATE, 0);
+    if (state != NULL) {
+        send_status(bridge, state);
+    }
 }
 
 uint32_t gust_bridge_safe_frames(gust_bridge *bridge, gust_frame frames[GUST_PIECES])

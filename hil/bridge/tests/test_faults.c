@@ -8,6 +8,12 @@
 
 static stand s; /* too large for a stack under sanitizers */
 
+static uint32_t never_empty(gust_transport *transport)
+{
+    (void)transport;
+    return 1;
+}
+
 /* ---- A run without faults ---- */
 
 static void life(void **unused)
@@ -20,8 +26,11 @@ static void life(void **unused)
         assert_int_equal(s.heard.references, 1);
         assert_false(s.heard.enabled);
         assert_true(s.heard.omega_gsc == 1.0 && s.heard.beta_ref == 90.0 && s.heard.i_d_gsc == 0.25);
-        assert_int_equal(s.heard.fingerprints, 1);
+        assert_int_equal(s.heard.states, 1);
+        stand_period(&s);
         assert_int_equal(s.heard.heartbeats, 1);
+        stand_period(&s);
+        assert_int_equal(s.heard.fingerprints, 1);
         stand_ready(&s);
         assert_int_equal(s.told_state, GUST_STATE_READY); /* told in the period of the change */
         s.v_dc = 1.125;
@@ -70,6 +79,68 @@ static void cyclic_messages(void **unused)
     assert_int_equal(states, 200);
     assert_int_equal(heartbeats, 20);
     assert_int_equal(fingerprints, 2);
+}
+
+static uint32_t beside_references(void)
+{
+    return s.heard.states + s.heard.responses + s.heard.heartbeats + s.heard.fingerprints;
+}
+
+/* An operator asks in each period: nobody waits longer for a turn than there are others, and references wait
+ * for one frame of them at most. */
+static void turns(void **unused)
+{
+    (void)unused;
+    stand_begin(&s, &test_database, true);
+    stand_run(&s);
+    uint32_t states = 0, responses = 0, heartbeats = 0, fingerprints = 0;
+    for (int k = 0; k < 2000; ++k) {
+        stand_request(&s, 0.0, TEST_K_DROOP, 0.0);
+        stand_period(&s);
+        assert_int_equal(s.heard.references, 1);
+        assert_int_equal(beside_references(), 1);
+        states += s.heard.states;
+        responses += s.heard.responses;
+        heartbeats += s.heard.heartbeats;
+        fingerprints += s.heard.fingerprints;
+    }
+    assert_int_equal(states, 200);
+    assert_int_equal(heartbeats, 20);
+    assert_int_equal(fingerprints, 2);
+    assert_int_equal(responses, 2000 - 222);
+    assert_int_equal(stand_state(&s), GUST_STATE_RUN);
+}
+
+/* Nothing joins a queue in which something is left; a state that changes is told as soon as it is empty. */
+static void nothing_joins_a_queue(void **unused)
+{
+    (void)unused;
+    stand_begin(&s, &test_database, true);
+    s.bridge.config.limits.missing = 20;
+    stand_run(&s);
+    while (s.heard.states == 0) {
+        stand_period(&s);
+    }
+    s.bus.held = true;
+    for (int k = 0; k < 15; ++k) {
+        gust_bridge_tick(&s.bridge, 1);
+        assert_true(s.bus.node[0].n_queued <=
+                    2); /* references, which are called back, and one frame of others */
+    }
+    s.bus.held = false;
+    stand_period(&s);
+    stand_period(&s);
+    assert_int_equal(stand_state(&s), GUST_STATE_SAFE);
+    assert_int_equal(s.told_state, GUST_STATE_SAFE);
+    /* An echo that got lost: after so many periods the turns go on. */
+    s.bridge.config.limits.missing = 2;
+    s.bus.node[0].transport.pending = never_empty;
+    uint32_t states = 0;
+    for (int k = 0; k < 300; ++k) {
+        stand_period(&s);
+        states += s.heard.states;
+    }
+    assert_true(states > 20);
 }
 
 /* Bare database: no Sync, heartbeat, fingerprint or state. */
@@ -658,6 +729,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(life),
         cmocka_unit_test(cyclic_messages),
+        cmocka_unit_test(turns),
+        cmocka_unit_test(nothing_joins_a_queue),
         cmocka_unit_test(bare),
         cmocka_unit_test(pieces),
         cmocka_unit_test(each_reaches_safe),

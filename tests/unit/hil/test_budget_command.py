@@ -59,6 +59,8 @@ def test_all_rates() -> None:
         (("--event-distance", "nan"), "GF8123"),
         (("--errors-every", "5 V"), "GF2302"),
         (("--dbc", "nowhere.dbc"), "GF8001"),
+        (("--fifo", "NOBODY"), "GF8125"),
+        (("--fifo", "CTRL", "--fifo", "CTRL+OPER"), "GF8125"),
     ],
 )
 def test_what_is_refused(arguments: tuple[str, ...], code: str) -> None:
@@ -73,6 +75,29 @@ def test_a_long_frame_that_is_not_fd_is_refused(tmp_path: Path) -> None:
     assert (exit_code, "GF8124: Long has 12 bytes" in error) == (2, True), error
 
 
+def test_a_plain_queue_is_said_and_counts() -> None:
+    code, out, error = budget("--fifo", "CTRL")
+    assert code == 1
+    assert "GF8122: References of gustform_fd may take 1.1" in error
+    assert error.rstrip().endswith("try --bitrate 500k --data-bitrate 4M")
+    assert "CTRL: a plain queue" in out
+    assert "the bridge sends one of its slow messages in each period" in out
+    rates = ("--data-bitrate", "4M")
+    code, text, _ = budget("--fifo", "CTRL", "--fifo", "OPER", *rates, "--json")
+    found = json.loads(text)
+    assert (code, found["fifo"], found["fits"]) == (0, [["CTRL"], ["OPER"]], True)
+    messages = {m["name"]: m for m in found["messages"]}
+    assert messages["References"]["paced_s"] is None
+    state, references = messages["ControllerState"], messages["References"]
+    # Three others may be first, one in each period; then it has its turn, and the fate of the queue.
+    assert state["paced_s"] == 1e-3
+    assert state["response_s"] == pytest.approx(3e-3 + references["response_s"], abs=2e-6)
+    # On one interface references wait for the operator's frames as well.
+    _, text, _ = budget("--fifo", "CTRL+OPER", *rates, "--json")
+    shared = {m["name"]: m for m in json.loads(text)["messages"]}
+    assert shared["References"]["response_s"] > references["response_s"] + 3e-4
+
+
 def test_jitter_and_errors_are_said() -> None:
     _, out, _ = budget("--data-bitrate", "5M", "--jitter", "50 us", "--errors-every", "100 ms")
     assert "each frame up to 0.05 ms late" in out
@@ -80,14 +105,19 @@ def test_jitter_and_errors_are_said() -> None:
 
 
 def test_the_bench_readme_shows_these_numbers() -> None:
-    rows = re.findall(r"^\| (FD|classic), (.*?) \| . ms \| (.*?) % \| (\d+) us \| (.*?) ms \|$",
+    rows = re.findall(r"^\| (FD|classic), (.*?) \| . ms \| (.*?) % \| (\d+) us \| (.*?) ms \| (.*?) ms(?:, late)? \|$",
                       (ROOT / "hil" / "README.md").read_text(), flags=re.MULTILINE)  # fmt: skip
     assert len(rows) == 4
-    for kind, rates, load, cyclic, response in rows:
+    for kind, rates, load, cyclic, response, in_plain_queue in rows:
         nominal, _, data = (rate.replace(" kbit/s", "k").replace(" Mbit/s", "M") for rate in rates.partition(", data "))
         of_data = ["--data-bitrate", data] if data else []
-        found = json.loads(budget("--bus", kind.lower(), "--bitrate", nominal, *of_data, "--json")[1])
-        messages = [m for m in found["messages"] if re.match("Sync|Measurements|References", m["name"])]
+        words = ["--bus", kind.lower(), "--bitrate", nominal, *of_data, "--json"]
+        found, queued = (json.loads(budget(*words, *more)[1]) for more in ((), ("--fifo", "CTRL", "--fifo", "OPER")))
+        messages, same = (
+            [m for m in one["messages"] if re.match("Sync|Measurements|References", m["name"])]
+            for one in (found, queued)
+        )
         assert f"{100 * found['load']:.1f}" == load, rates
         assert 1e6 * sum(m["frame_s"] for m in messages) == pytest.approx(int(cyclic), abs=0.51), rates
         assert f"{1e3 * messages[-1]['response_s']:.3f}" == response, rates
+        assert f"{1e3 * same[-1]['response_s']:.3f}" == in_plain_queue, rates

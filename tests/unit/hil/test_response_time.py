@@ -151,3 +151,121 @@ def test_the_bound_is_reached_when_all_come_at_once(seed: int) -> None:
 def test_the_second_instance_is_the_worst_one_in_the_simulation_too() -> None:
     releases = [periodic(m, Fraction(0), Fraction(1000)) for m in EXAMPLE]
     assert simulate(EXAMPLE, releases, releases)[2] == Fraction(7, 2) * 125
+
+
+# ---- Plain queues ---------------------------------------------------------------------------------------------------
+
+
+def test_in_a_plain_queue_all_share_the_fate_of_the_least_urgent() -> None:
+    # C was first: it loses to B, and A has to wait for both.
+    found = times([replace(traffic("A", 100, 9000), queue="x"), traffic("B", 80, 9000),
+                   replace(traffic("C", 50, 9000), queue="x"), traffic("D", 60, 9000)])  # fmt: skip
+    assert found == [60 + 80 + 50 + 100, 100 + 80 + 60, 290, 290]
+
+
+def test_a_queue_of_one_is_no_other_than_a_sorted_one() -> None:
+    compared = 0
+    for seed in range(60):
+        messages = [replace(m, jitter=Fraction(0)) for m in random_set(random.Random(seed))]
+        expected = times(messages)
+        if all(t <= m.period for t, m in zip(expected, messages, strict=True)):
+            compared += 1
+            assert times([replace(m, queue=m.name) for m in messages]) == expected
+    assert compared > 20
+
+
+def test_what_a_plain_queue_hides_comes_in_a_bunch() -> None:
+    """B may stand 410 behind A, which loses to C and D, and then come with the next one of its kind close behind it."""
+    queue = [traffic("D", 50, 5000), replace(traffic("B", 90, 520), queue="x"), traffic("C", 60, 5000),
+             replace(traffic("A", 300, 5000), queue="x")]  # fmt: skip
+    assert times([replace(m, queue=None) for m in queue])[2] == 300 + 50 + 90 + 60
+    assert times(queue)[2] == 300 + 50 + 2 * 90 + 60
+
+
+def test_messages_that_are_paced_are_one_in_the_queue() -> None:
+    slow = [replace(traffic(n, t, 20_000), queue="x", sender="x") for n, t in (("C", 50), ("D", 90), ("E", 60))]
+    first = replace(traffic("A", 100, 1000), queue="x", sender="x")
+    plain = times([first, *slow])
+    assert plain[0] == 300
+    paced = times([first, *(replace(m, paced=Fraction(1000)) for m in slow)])
+    assert paced == [190, *[2000 + 190] * 3]
+
+
+def test_an_overloaded_plain_queue_has_no_bound_and_takes_others_with_it() -> None:
+    found = response_times(
+        [replace(traffic("A", 60, 1000), queue="x"), traffic("B", 55, 100), replace(traffic("C", 50, 100), queue="x")],
+        BUS,
+    )
+    assert found == [None, None, None]
+
+
+def play(messages: list[Traffic], releases: list[list[Fraction]], rng: random.Random) -> list[list[Fraction]]:
+    """When each frame has left: as `simulate`, with plain queues; what joins one at the same moment does so in any
+    order."""
+    events = sorted((t, rng.random(), k, n) for k, some in enumerate(releases) for n, t in enumerate(some))
+    queues: dict[str, list[tuple[int, int]]] = {}
+    left = [[Fraction(0)] * len(some) for some in releases]
+    now, at = Fraction(0), 0
+    while at < len(events) or any(queues.values()):
+        if not any(queues.values()):
+            now = max(now, events[at][0])
+        while at < len(events) and events[at][0] <= now:
+            _, _, k, n = events[at]
+            queues.setdefault(messages[k].queue or f"sorted {k}", []).append((k, n))
+            at += 1
+        name = min((name for name, waiting in queues.items() if waiting), key=lambda name: queues[name][0][0])
+        k, n = queues[name].pop(0)
+        now += messages[k].time
+        left[k][n] = now
+    return left
+
+
+def pace(due: list[list[Fraction]], distance: Fraction, first: Fraction) -> list[list[Fraction]]:
+    """When a sender hands over frames that are due: one in each `distance`, taking turns."""
+    handed: list[list[Fraction]] = [[] for _ in due]
+    now, turn = first, 0
+    while any(len(h) < len(d) for h, d in zip(handed, due, strict=True)):
+        order = [(turn + k) % len(due) for k in range(len(due))]
+        ready = [k for k in order if len(handed[k]) < len(due[k]) and due[k][len(handed[k])] <= now]
+        if ready:
+            handed[ready[0]].append(now)
+            turn = ready[0] + 1
+        now += distance
+    return handed
+
+
+def queued_set(rng: random.Random) -> list[Traffic]:
+    """Some of a random set in plain queues, some of those paced: at least two that are due at multiples of it."""
+    found = random_set(rng)
+    while True:
+        messages = [replace(m, queue=rng.choice([None, None, "x", "y"]), sender="x") for m in found]
+        slow = [k for k, m in enumerate(messages) if m.queue == "x" and m.period >= 1000]
+        if len(slow) >= 2 and rng.random() < 0.7:
+            for k in slow:
+                messages[k] = replace(messages[k], paced=Fraction(250), period=Fraction(1000), jitter=Fraction(0))
+        if all(r is not None and r <= m.period for r, m in zip(response_times(messages, BUS), messages, strict=True)):
+            return messages
+        found = random_set(rng)
+
+
+@pytest.mark.parametrize("seed", range(80))
+def test_no_frame_of_a_plain_queue_is_later_than_the_bound(seed: int) -> None:
+    rng = random.Random(seed)
+    messages = queued_set(rng)
+    bounds = times(messages)
+    paced = [k for k, m in enumerate(messages) if m.paced is not None]
+    for _ in range(6):
+        tick = Fraction(rng.randrange(250))
+        firsts = [
+            tick + 250 * rng.randrange(4) if k in paced else Fraction(rng.choice([0, rng.randrange(int(m.period))]))
+            for k, m in enumerate(messages)
+        ]
+        nominal = [periodic(m, first, Fraction(20_000)) for m, first in zip(messages, firsts, strict=True)]
+        releases = [
+            [t + rng.choice([0, int(m.jitter), rng.randint(0, int(m.jitter))]) for t in some]
+            for m, some in zip(messages, nominal, strict=True)
+        ]
+        for k, handed in zip(paced, pace([nominal[k] for k in paced], Fraction(250), tick), strict=True):
+            releases[k] = handed
+        for message, left, due, bound in zip(messages, play(messages, releases, rng), nominal, bounds, strict=True):
+            assert max(a - b for a, b in zip(left, due, strict=True)) <= bound, message

@@ -10,6 +10,11 @@
  * and that is a fault. (A tick that comes soon after a late one queues none and waits for the next.) Nothing is
  * ever sent twice. So no command older than one period is handed to the bus.
  *
+ * The queue of an interface keeps its order, so references wait for what was handed over before them. Therefore
+ * all else, state, answers, heartbeat, fingerprint, takes turns: one frame in a period, behind the references,
+ * and none as long as the one before has not left (for limits.missing periods at most: an echo can get lost). A
+ * change of the state goes first.
+ *
  * Ownership: the caller's, everything pointed to must outlive it. Nothing is allocated. One thread, except
  * the last three functions.
  */
@@ -31,6 +36,7 @@
 #include "transport.h"
 
 #define GUST_CONTEXT 4096 /* bytes of a controller's context, at most */
+#define GUST_TURNS   4    /* parts that take turns */
 
 /* The largest change of a measured quantity that is taken for true, per second. */
 typedef struct gust_rate {
@@ -77,9 +83,12 @@ typedef struct gust_bridge {
     uint32_t sync_periods; /* since the Sync before */
     uint64_t sync_modulus; /* 0: the database has no Sync */
     uint64_t ticks;
-    uint64_t steps, held; /* periods in RUN with a step, and without */
-    uint64_t begun;       /* the tick, ns of the transport's clock */
-    uint64_t handed;      /* the tick whose references were handed over last */
+    uint64_t steps, held;    /* periods in RUN with a step, and without */
+    uint64_t begun;          /* the tick, ns of the transport's clock */
+    uint64_t handed;         /* the tick whose references were handed over last */
+    bool wanted[GUST_TURNS]; /* what waits for its turn */
+    uint32_t turn;           /* who is first in the next period */
+    uint32_t unquiet;        /* periods in which something handed over had not left */
     gust_state told_state;
     uint32_t told_faults;
     _Atomic uint32_t sample; /* number of the last fresh sample */
