@@ -21,6 +21,7 @@ from gustform_cli.wind.turbulence import TurbulentWind
 from gustform_codegen.cache import KernelCache
 from tests.components.systems import sampled_table
 from tests.physics.running import ready
+from tests.support.case import open_case
 
 Array = NDArray[np.float64]
 SOURCES = ("measured", "estimated")
@@ -183,3 +184,21 @@ def test_what_the_table_does_not_reach_is_refused() -> None:
         turbine(10.0, "measured", 0.5).parameter_values()
     with pytest.raises(GustformError, match="wind_source must be measured or estimated"):
         turbine(10.0, "guessed")
+
+
+@pytest.mark.parametrize("wind", [9.0, 9.5, 10.0])
+def test_starts_in_a_strong_grid_with_a_soft_shaft(wind: float) -> None:
+    """The first guess has the generator, which delivers 1 % of its rating here, below no valve opening at all: a whole
+    Newton step from there goes out of bounds, and across the limiters of the pitch, where nothing leads back."""
+    case = open_case(
+        "turbulent_10min",
+        "components.sg.rating=4200 MVA",
+        "components.wt.drive={type: TwoMass}",
+        "components.wt.schedule={type: CurtailmentSchedule}",
+        f"wind.wt.mean={wind} m/s",
+    )
+    with case.simulation(("wt.omega_r", "wt.schedule.omega_del", "wt.beta", "wt.schedule.beta_del")) as simulation:
+        simulation.initialise(0.0)
+        omega_r, omega_del, beta, beta_del = simulation.channels()
+    assert omega_r == pytest.approx(omega_del, abs=1e-8)
+    assert beta == pytest.approx(max(beta_del, 0.0), abs=1e-6)

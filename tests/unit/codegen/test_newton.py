@@ -58,6 +58,23 @@ def test_it_says_when_it_finds_none(start: list[float], low: list[float], high: 
     assert newton(circle, circle_slopes, np.array(start), np.array(low), np.array(high)) is None
 
 
+@pytest.mark.parametrize("start", [8.0, 100.0])
+def test_where_whole_steps_leave_the_bounds_shorter_ones_do_not(start: float) -> None:
+    """ln x = 0: the tangent at 8 is zero at 8 - 8 ln 8 < 0."""
+    low, high = np.array([1e-9]), np.array([1e9])
+    found = newton(np.log, lambda x: np.array([1.0 / x]), np.array([start]), low, high)
+    assert found is not None
+    assert found[0] == pytest.approx([1.0], abs=1e-11)
+
+
+def test_where_whole_steps_are_thrown_from_side_to_side_shorter_ones_are_not() -> None:
+    """atan x = 0 from 3: whole steps go to -9.5, 124, ..."""
+    free = np.array([-np.inf]), np.array([np.inf])
+    found = newton(np.arctan, lambda x: np.array([1.0 / (1.0 + x * x)]), np.array([3.0]), *free)
+    assert found is not None
+    assert found[0] == pytest.approx([0.0], abs=1e-11)
+
+
 def test_one_of_many_roots_is_none() -> None:
     """x + y = 1 and 2 x + 2 y = 2: a line of roots."""
 
