@@ -49,7 +49,7 @@ class Request:
     dbc: Path | None = None
     mapping: Path | None = None
     bitrate: str | None = None
-    data_bitrate: str = "2M"
+    data_bitrate: str = "4M"
     event_distance: str = "10 ms"
     jitter: str = "0"
     errors_every: str | None = None

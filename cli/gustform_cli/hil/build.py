@@ -15,8 +15,9 @@ from gustform_cli.hil import budget as budgets
 from gustform_codegen.emit.controller.discretise import discretise
 from gustform_codegen.emit.controller.folder import default_prefix
 from gustform_codegen.emit.controller.program import program
-from gustform_hil.budget import refuse
+from gustform_hil.budget import Budget, refuse
 from gustform_hil.database import load_message_set, shipped_files
+from gustform_hil.message_set import MessageSet, Part
 from gustform_hil.rig import Rig, check_target, compile_rig, period, write_rig
 
 
@@ -39,7 +40,7 @@ class Options:
     mapping: Path | None = None
     period: str | None = None
     bitrate: str | None = None
-    data_bitrate: str = "2M"
+    data_bitrate: str = "4M"
     allow_overload: bool = False
     compile: bool = True
     overrides: Sequence[str] = ()
@@ -52,8 +53,7 @@ def build(scenario: Path, out: Path, options: Options | None = None) -> Built:
     database, mapping = _files(given)
     messages = load_message_set(database, mapping)
     if not given.allow_overload:
-        rates = budgets.Request(dbc=database, mapping=mapping, bitrate=given.bitrate, data_bitrate=given.data_bitrate)
-        refuse(budgets.budget_of(rates))
+        refuse(_budget(given, database, mapping, messages))
     seconds = period(messages) if given.period is None else sample_period(given.period)
     name = find_turbine(scenario, given.turbine).name
     block = block_of_scenario(name, scenario, given.overrides)
@@ -67,6 +67,17 @@ def build(scenario: Path, out: Path, options: Options | None = None) -> Built:
     rig = Rig(made, default_prefix(block.name), messages, database, mapping, origin)
     write_rig(rig, out)
     return Built(rig, out, compile_rig(out) if given.compile else None)
+
+
+def _budget(given: Options, database: Path, mapping: Path, messages: MessageSet) -> Budget:
+    """The bridge is a program on Linux: its interface has a plain queue."""
+    references = messages.find(Part.REFERENCES)
+    senders = () if references is None else references.senders[:1]
+    return budgets.budget_of(
+        budgets.Request(
+            dbc=database, mapping=mapping, bitrate=given.bitrate, data_bitrate=given.data_bitrate, fifo=senders
+        )
+    )
 
 
 def _files(given: Options) -> tuple[Path, Path]:
