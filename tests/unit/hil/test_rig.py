@@ -136,7 +136,7 @@ def test_the_command_takes_the_turbine_of_a_scenario(tmp_path: Path) -> None:
     described = json.loads((tmp_path / "rig" / "controller" / "dual_port.json").read_text())
     assert {p["name"]: p["default"] for p in described["parameters"]}["K_gsc"] == 0.4
     # Known before there is a controller: the messages do not fit these rates.
-    slow = ["--out", tmp_path / "late", "--no-compile", "--data-bitrate", "2M"]
+    slow: list[str | Path] = ["--out", tmp_path / "late", "--no-compile", "--data-bitrate", "2M"]
     over = build(LOAD_STEP, *slow, "--bitrate", "250k")
     assert (over.returncode, "GF8121" in over.stderr) == (1, True)
     # They would, if the bridge's interface sorted its frames.
