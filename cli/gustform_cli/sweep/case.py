@@ -81,7 +81,9 @@ class Fault:
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a case ended. `status`: completed or failed. `data`: its result file, if it could not be written there."""
+    """How a case ended. `status`: completed or failed. `file`: the name of its result in the folder of results, which
+    it has until somebody notes the outcome; `data`: the result itself, where the worker does not see that folder.
+    """
 
     number: int
     status: str
@@ -90,6 +92,7 @@ class Outcome:
     units: Mapping[str, str]
     wall_seconds: float
     solve_seconds: float
+    file: str | None = None
     data: bytes | None = field(default=None, repr=False)
 
 
@@ -141,19 +144,19 @@ def _run(task: Task, begin: float) -> Outcome:
     kept = task.keep != "none"
     # A name of its own: another worker may have been given the same case after a loss of contact.
     file = (folder or _local_folder()) / f"{task.key[:16]}-{uuid.uuid4().hex}.nc" if kept else None
+    left, data = None, None
     try:
         with Run(model, table, file, [moments.add]) as execution:
             ended = execution.execute()
-        data = None
         if file is not None and (ended.error is not None or task.keep == "all"):
             if folder is not None:
-                file.replace(folder / result_name(task.key))
+                left = file.name
             else:
                 data = file.read_bytes()
     finally:
         if file is not None and folder is None:
             shutil.rmtree(file.parent, ignore_errors=True)
-        elif file is not None:
+        elif file is not None and left is None:
             file.unlink(missing_ok=True)
     summary = ended.summary
     scalars = dict(_flat(summary.as_dict(), summary.solver))
@@ -169,6 +172,7 @@ def _run(task: Task, begin: float) -> Outcome:
         units,
         time.perf_counter() - begin,
         summary.wall_seconds,
+        left,
         data,
     )
 

@@ -153,8 +153,7 @@ def _run(the_plan: Plan, store: Store, pool: Pool, tasks: list[Task], out: Path,
     with CaseProgress(len(tasks), "running") as progress:
         for done, (task, result) in enumerate(pool.map(case.run, tasks, lambda: interrupt.requested), start=1):
             outcome = _outcome(task, result)
-            if outcome.data is not None:
-                _keep(outcome.data, out / RUNS / result_name(task.key))
+            _keep(outcome, out / RUNS / result_name(task.key))
             store.add(task.key, outcome)
             progress.failed += outcome.status == "failed"
             progress.show(done)
@@ -171,8 +170,11 @@ def _outcome(task: Task, result: Outcome | Lost) -> Outcome:
     return case.failed(task.number, Fault("GF6901", f"the worker process died: {result.reason}", hint, None))
 
 
-def _keep(data: bytes, file: Path) -> None:
-    part = file.with_name(f"{file.name}-part")
+def _keep(outcome: Outcome, file: Path) -> None:
+    """Give the result its name: only now, for a case that nobody notes must not leave one."""
+    part = file.with_name(outcome.file or f"{file.name}-part")
     with writing(file):
-        part.write_bytes(data)
-        part.replace(file)
+        if outcome.data is not None:
+            part.write_bytes(outcome.data)
+        if outcome.data is not None or outcome.file is not None:
+            part.replace(file)

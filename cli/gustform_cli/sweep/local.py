@@ -78,13 +78,17 @@ class LocalPool:
     def map(
         self, function: Callable[[T], R], tasks: Sequence[T], stopped: Callable[[], bool] = lambda: False
     ) -> Iterator[tuple[T, R | Lost]]:
-        """(task, function(task)) in the order in which they end, until `stopped`. What `function` raises is raised."""
+        """(task, function(task)) in the order in which they end, until `stopped`; workers that are busy then are ended.
+        What `function` raises is raised."""
         waiting = deque(tasks)
         deaths: dict[int, int] = {}
-        while (waiting or any(worker.busy for worker in self._workers)) and not stopped():
-            self._give(function, waiting)
+        ending = False
+        while not ending and (waiting or any(worker.busy for worker in self._workers)):
+            ending = stopped()
+            if not ending:
+                self._give(function, waiting)
             busy = {worker.connection: worker for worker in self._workers if worker.busy}
-            for connection in wait(list(busy), _POLL):
+            for connection in wait(list(busy), 0.0 if ending else _POLL):
                 assert isinstance(connection, Connection)
                 worker = busy[connection]
                 task, worker.task, worker.busy = worker.task, None, False
@@ -101,6 +105,9 @@ class LocalPool:
                 if isinstance(result, _Raised):
                     raise WorkerDefect(result.traceback)
                 yield task, result
+        for worker in [one for one in self._workers if one.busy]:
+            worker.process.terminate()
+            self._bury(worker)
 
     def _give(self, function: Callable[[T], R], waiting: deque[T]) -> None:
         """A task for every idle worker; new workers while there are fewer than wanted."""

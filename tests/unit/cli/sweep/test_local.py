@@ -32,6 +32,12 @@ def fail(number: int) -> int:
     raise ValueError(f"not {number}")
 
 
+def write_later(task: tuple[str, float]) -> None:
+    file, seconds = task
+    time.sleep(seconds)
+    Path(file).touch()
+
+
 def sleep(seconds: float) -> float:
     time.sleep(seconds)
     return seconds
@@ -70,3 +76,26 @@ def test_stopping_does_not_wait_for_what_is_running() -> None:
             found.append(task)
     assert found == [0.0]
     assert time.monotonic() - begin < 60.0
+
+
+def test_what_has_ended_when_it_stops_is_kept_and_nothing_runs_on(tmp_path: Path) -> None:
+    """One task is through, another one would write a file later, when nobody looks any more."""
+    late = tmp_path / "late"
+    looks = 0
+
+    def stopped() -> bool:
+        nonlocal looks
+        looks += 1
+        if looks == 2:
+            deadline = time.monotonic() + 60.0
+            while not (tmp_path / "early").exists():
+                assert time.monotonic() < deadline
+                time.sleep(0.01)
+            time.sleep(0.3)  # its result is under way
+        return looks > 1
+
+    with LocalPool(2) as pool:
+        tasks = [(str(tmp_path / "early"), 0.2), (str(late), 30.0)]
+        assert [task for task, _ in pool.map(write_later, tasks, stopped)] == tasks[:1]
+        assert len(pool._workers) == 1  # the other one has been ended
+    assert not late.exists()
