@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -135,24 +136,35 @@ def test_killed_after_the_last_row(tmp_path: Path) -> None:
     assert "GF7006" in process.stderr
 
 
+def stop(out: Path, sent: signal.Signals, moment: Callable[[], bool], *changes: str) -> tuple[int, str]:
+    """Starts a run and sends it a signal at some moment of it; how it ended. Again, if it came to its end before."""
+    for _ in range(5):
+        process = subprocess.Popen(
+            start(out, *changes), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, env=environment()
+        )
+        deadline = time.monotonic() + 120.0
+        while process.poll() is None and not moment():
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        process.send_signal(sent)
+        _, said = process.communicate(timeout=60)
+        if process.returncode != 0:
+            return process.returncode, said
+    pytest.fail("five runs, and all of them were over before anybody looked")
+
+
 def kill_in_the_middle(out: Path, *changes: str) -> None:
     """Leaves a run that was killed after its first hour."""
-    process = subprocess.Popen(
-        start(out, *changes), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=environment()
-    )
     file = out / "result.nc.checkpoint"
-    deadline = time.monotonic() + 120.0
-    while True:
-        assert time.monotonic() < deadline
-        assert process.poll() is None
+
+    def an_hour() -> bool:
         try:
-            if decode(file.read_bytes(), file).time > 3600.0:
-                break
+            return decode(file.read_bytes(), file).time > 3600.0
         except (OSError, GustformError):
-            pass
-        time.sleep(0.01)
-    process.kill()
-    process.wait()
+            return False
+
+    stop(out, signal.SIGKILL, an_hour, *changes)
+    assert an_hour()
 
 
 def test_the_directory_of_a_torn_file_is_not_needed(tmp_path: Path, whole: tuple[Path, float]) -> None:
@@ -168,16 +180,9 @@ def test_the_directory_of_a_torn_file_is_not_needed(tmp_path: Path, whole: tuple
 
 
 def test_ctrl_c_can_be_taken_back(tmp_path: Path, whole: tuple[Path, float]) -> None:
-    process = subprocess.Popen(
-        start(tmp_path), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment()
-    )
-    deadline = time.monotonic() + 60.0
-    while not ((part := tmp_path / "result.nc.part").exists() and part.stat().st_size > 60_000):
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
-    process.send_signal(signal.SIGINT)
-    _, said = process.communicate(timeout=60)
-    assert process.returncode == 130, said
+    part = tmp_path / "result.nc.part"
+    code, said = stop(tmp_path, signal.SIGINT, lambda: part.exists() and part.stat().st_size > 60_000)
+    assert code == 130, said
     with xarray.open_dataset(tmp_path / "result.nc") as data:
         assert data.attrs["status"] == "interrupted"
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
