@@ -127,7 +127,12 @@ def test_a_command_that_cannot_run_or_is_killed_has_the_code_of_the_shell(
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGUSR1])
 def test_a_signal_reaches_the_command_which_ends_in_its_own_way(number: signal.Signals, place: Path) -> None:
     program = f"trap 'echo caught; exit 7' {number:d}; echo waiting; while :; do sleep 0.1; done"
-    with subprocess.Popen(arguments("bash", "-c", program), stdout=subprocess.PIPE, text=True) as process:
+
+    def not_ignored() -> None:  # as a shell without job control leaves it to what it runs in the background
+        signal.signal(number, signal.SIG_DFL)
+
+    words = arguments("bash", "-c", program)
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True, preexec_fn=not_ignored) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "waiting\n"
         process.send_signal(number)
