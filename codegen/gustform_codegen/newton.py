@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Function = Callable[[Array], Array]
 
 _LARGEST = 300  # unknowns; beyond, a dense Jacobian costs more than Ipopt
 _STEPS = 12
@@ -23,8 +24,8 @@ _SINGULAR = 1e-10  # smallest over largest singular value
 
 
 def newton(
-    residual: Callable[[Array], Array],
-    jacobian: Callable[[Array], Array],
+    residual: Function,
+    jacobian: Function,
     start: Array,
     low: Array,
     high: Array,
@@ -46,8 +47,8 @@ def newton(
 
 
 def _search(
-    residual: Callable[[Array], Array],
-    jacobian: Callable[[Array], Array],
+    residual: Function,
+    jacobian: Function,
     start: Array,
     low: Array,
     high: Array,

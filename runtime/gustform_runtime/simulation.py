@@ -203,7 +203,7 @@ class Simulation:
     def set_sampled(self, block: int, step: SampledStep) -> None:
         """At each sample of a sampled block call step(time (s), measurements) -> commands, in place of its own
         controller. Names and order are those of sampled_blocks(); numbers are rounded to the block's type on either
-        side."""
+        side. What its own controller would tell of itself is recorded as NaN."""
         blocks = self.sampled_blocks()
         n_in, n_out = (
             (len(blocks[block].measurements), len(blocks[block].commands)) if 0 <= block < len(blocks) else (0, 0)

@@ -115,7 +115,7 @@ GUST_API gust_status gust_sim_set_statistics(gust_sim *sim, gust_stats *stats, d
 
 /* Before initialise: `step` takes the place of the controller of a sampled block (counted from 0, see
  * gust_model_sampled_block). NULL: the model's own again. `context` stays the caller's; a checkpoint holds
- * nothing of it. */
+ * nothing of it. What the model's controller would tell of itself, its monitors, is recorded as NaN. */
 GUST_API gust_status gust_sim_set_sampled(gust_sim *sim, int32_t block, gust_sampled_step step, void *context);
 
 /* Samples and errors of a sampled block so far. */
