@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from gustform.control.converter_control import ConverterControl
-from gustform.control.curtailment_schedule import CurtailmentSchedule
-from gustform.language.component import Component, suggest
+from gustform.language.component import suggest
 from gustform.language.errors import GustformError
 from gustform.registry import PARTS
 from gustform.turbines.pmsg_turbine import PmsgTurbine
@@ -134,7 +133,4 @@ def block_of_scenario(name: str, scenario: Path, overrides: Sequence[str], *, sc
             values |= {alias: sign * at[path] for alias, (path, sign) in t.unit.aliases.items() if path in at}
     values = {key: rounded(v) for key, v in values.items()}
     turbine = found.component
-    part: Component | None = schedule_of(turbine)
-    if schedule is not None:
-        part = turbine.schedule if schedule and isinstance(turbine.schedule, CurtailmentSchedule) else None
-    return controller_block(turbine.control, turbine.pitch, values, part)
+    return controller_block(turbine.control, turbine.pitch, values, schedule_of(turbine, schedule))

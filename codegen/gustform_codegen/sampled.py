@@ -66,10 +66,13 @@ def is_sampled(component: Component) -> bool:
     return sampled
 
 
-def schedule_of(turbine: Any) -> CurtailmentSchedule | None:
-    """The schedule that is part of a turbine's exported controller, if one is."""
+def schedule_of(turbine: Any, inside: bool | None = None) -> CurtailmentSchedule | None:
+    """The schedule that is part of a turbine's exported controller, if one is; by its `location` unless told."""
     schedule = turbine.schedule
-    inside = isinstance(schedule, CurtailmentSchedule) and schedule.location == "controller"
+    if not isinstance(schedule, CurtailmentSchedule):
+        return None
+    if inside is None:
+        inside = schedule.location == "controller"
     return schedule if inside else None
 
 

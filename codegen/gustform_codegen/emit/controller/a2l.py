@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from gustform_codegen.emit.controller.c_header import Names
+from gustform_codegen.emit.controller.c_header import Names, members
 from gustform_codegen.emit.controller.program import Program
 from gustform_codegen.emit.controller.signals import Signal
 
@@ -21,11 +21,9 @@ def _text(words: str) -> str:
 
 def offsets(program: Program, size: int) -> dict[str, int]:
     """Where each member stands in the context, bytes; `size` of a number. The order is that of the header."""
-    block, step = program.step.block, program.step
-    members = [("in", block.inputs), ("out", block.outputs), ("mon", block.monitors), ("p", step.parameters)]
-    names = [f"{place}.{s.name}" for place, signals in members for s in signals]
+    names = [f"{place}.{s.name}" for place, signals in members(program).values() for s in signals]
     result = {name: size * k for k, name in enumerate(names)}
-    words = len(names) + max(program.n_constants, 1) + max(len(step.memory), 1)
+    words = len(names) + max(program.n_constants, 1) + max(len(program.step.memory), 1)
     return result | {"errors": size * words, "faulty_inputs": size * words + 4}
 
 
@@ -35,8 +33,8 @@ def a2l(program: Program, names: Names) -> str:
     size = 8 if names.double else 4
     kind = f"FLOAT{8 * size}_IEEE"
     at = offsets(program, size)
-    signals = [*block.inputs, *block.outputs, *block.monitors, *step.parameters]
-    units = list(dict.fromkeys(s.unit for s in signals))
+    found = members(program)
+    units = list(dict.fromkeys(s.unit for _, signals in found.values() for s in signals))
 
     def limits(s: Signal) -> str:
         low = s.low if math.isfinite(s.low) else -_LARGEST[size]
@@ -63,7 +61,7 @@ def a2l(program: Program, names: Names) -> str:
         f"{limits(s)} /end CHARACTERISTIC"
         for s in step.parameters
     ]
-    for place, some in (("in", block.inputs), ("out", block.outputs), ("mon", block.monitors)):
+    for place, some in (found[kind] for kind in ("inputs", "outputs", "monitors")):
         lines += [
             f"    /begin MEASUREMENT {place}.{s.name} {_text(s.description)} {kind} {unit(s)} 0 0 {limits(s)} "
             f"ECU_ADDRESS 0x{at[f'{place}.{s.name}']:X} /end MEASUREMENT"

@@ -37,7 +37,18 @@ class Names:
         return self.prefix.upper()
 
 
-def _members(signals: list[Signal]) -> list[str]:
+def members(program: Program) -> dict[str, tuple[str, list[Signal]]]:
+    """What the context has signals of, in its order: kind -> member and signals."""
+    block = program.step.block
+    return {
+        "inputs": ("in", block.inputs),
+        "outputs": ("out", block.outputs),
+        "monitors": ("mon", block.monitors),
+        "parameters": ("p", program.step.parameters),
+    }
+
+
+def _fields(signals: list[Signal]) -> list[str]:
     width = max((len(s.name) for s in signals), default=0) + 1
     return [f"    real_type {s.name + ';':<{width}} /* {s.unit}: {s.description} */" for s in signals]
 
@@ -88,7 +99,7 @@ typedef float {p}_real;
     lines += bits
 
     def struct(signals: list[Signal], name: str, text: str) -> list[str]:
-        members = [m.replace("real_type", f"{p}_real", 1) for m in _members(signals)]
+        members = [m.replace("real_type", f"{p}_real", 1) for m in _fields(signals)]
         return ["", f"/* {text} */", f"typedef struct {p}_{name} {{", *members, f"}} {p}_{name};"]
 
     lines += struct(block.inputs, "inputs", "What is measured, and the operating point.")
@@ -96,11 +107,11 @@ typedef float {p}_real;
     if block.monitors:
         lines += struct(block.monitors, "monitors", "To be looked at; nothing is commanded by it. Always finite.")
     lines += struct(step.parameters, "parameters", "Read by startup and recalibrate only.")
+    monitors = f"\n    {p}_monitors mon;" if block.monitors else ""
     lines += f"""
 typedef struct {p}_context {{
     {p}_inputs in;
-    {p}_outputs out;
-@monitors@
+    {p}_outputs out;{monitors}
     {p}_parameters p;
     {p}_real constant[{max(program.n_constants, 1)}]; /* of the last good calibration */
     {p}_real memory[{max(len(step.memory), 1)}];
@@ -126,6 +137,4 @@ uint32_t {p}_reinitialise({p}_context *c);
 
 #endif
 """.splitlines()
-    at = lines.index("@monitors@")
-    lines[at : at + 1] = [f"    {p}_monitors mon;"] if block.monitors else []
     return "\n".join(lines) + "\n"

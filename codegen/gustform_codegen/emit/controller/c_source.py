@@ -91,6 +91,7 @@ def source(program: Program, names: Names) -> str:
     started += [f"c->memory[{k}] = {literal(s.value)};" for k, s in enumerate(block.states)]
     if not n:
         started.append("c->memory[0] = R(0.0);")
+    monitored = f"\n        {p}_monitors mon = c->mon;" if block.monitors else ""
     if block.monitors:
         outs.append("c->mon = mon;")
     finite = " && ".join(
@@ -223,8 +224,7 @@ uint32_t {p}_step({p}_context *c)
 @checks@
     if (faulty == 0U) {{
         real memory[{max(n, 1)}] = {{ 0 }};
-        {p}_outputs out = c->out;
-@monitored@
+        {p}_outputs out = c->out;{monitored}
         bool good = false;
         int k = 0;
 
@@ -262,5 +262,4 @@ uint32_t {p}_step({p}_context *c)
     }
     for name, lines in pieces.items():
         text = text.replace(f"@{name}@", "\n".join(lines))
-    text = text.replace("@monitored@\n", f"        {p}_monitors mon = c->mon;\n" if block.monitors else "")
     return text.replace("@finite@", finite)

@@ -8,7 +8,7 @@ import zlib
 from typing import Any
 
 from gustform.language.errors import GustformError
-from gustform_codegen.emit.controller.c_header import Names, errors_of
+from gustform_codegen.emit.controller.c_header import Names, errors_of, members
 from gustform_codegen.emit.controller.program import Program
 from gustform_codegen.emit.controller.signals import Signal
 
@@ -21,12 +21,6 @@ def stable_id(kind: str, name: str) -> int:
 def describe(program: Program, names: Names) -> dict[str, Any]:
     """The description as plain data. GF4103 if two ids are the same."""
     block, step = program.step.block, program.step
-    kinds = {
-        "inputs": ("in", block.inputs),
-        "outputs": ("out", block.outputs),
-        "parameters": ("p", step.parameters),
-        "monitors": ("mon", block.monitors),
-    }
     result: dict[str, Any] = {
         "format": "gustform controller 1",
         "name": names.prefix,
@@ -38,7 +32,7 @@ def describe(program: Program, names: Names) -> dict[str, Any]:
         "prewarped_rad_per_s": step.prewarped,
     }
     taken: dict[int, str] = {}
-    for kind, (member, signals) in kinds.items():
+    for kind, (member, signals) in members(program).items():
         entries = []
         for position, s in enumerate(signals):
             number = stable_id(kind, s.name)
