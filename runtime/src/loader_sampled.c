@@ -123,6 +123,16 @@ static bool read_kind(gust_reader *load, gust_model_sampled *block)
     return true;
 }
 
+static bool same_names(const gust_controller_signal *signals, const char *const *names, int32_t count)
+{
+    for (int32_t k = 0; k < count; ++k) {
+        if (strcmp(signals[k].name, names[k]) != 0) {
+            return false;
+        }
+    }
+    return true;
+}
+
 /* What the block says of its controller must be what the controller says of itself. */
 static bool check_controller(gust_reader *load, const gust_model_sampled *block, const char *const *monitors)
 {
@@ -132,22 +142,16 @@ static bool check_controller(gust_reader *load, const gust_model_sampled *block,
     const gust_controller *controller = load->model->libraries[block->library].controller;
     const gust_sampled_info *info = &block->info;
     const uint64_t states = (uint64_t)block->n_states * controller->real_size;
-    bool same = controller->n_inputs == (uint32_t)info->n_measurements &&
-                controller->n_outputs == (uint32_t)info->n_commands &&
-                controller->n_monitors == (uint32_t)block->n_monitors &&
-                (int64_t)controller->n_parameters == block->n_parameters &&
-                controller->real_size == (uint32_t)info->real_size && controller->period == info->period &&
-                block->state_offset % controller->real_size == 0 &&
-                block->state_offset + states <= controller->context_size;
-    for (int32_t k = 0; same && k < info->n_measurements; ++k) {
-        same = strcmp(controller->inputs[k].name, info->measurement_name[k]) == 0;
-    }
-    for (int32_t k = 0; same && k < info->n_commands; ++k) {
-        same = strcmp(controller->outputs[k].name, info->command_name[k]) == 0;
-    }
-    for (int32_t k = 0; same && k < block->n_monitors; ++k) {
-        same = strcmp(controller->monitors[k].name, monitors[k]) == 0;
-    }
+    const bool same = controller->n_inputs == (uint32_t)info->n_measurements &&
+                      controller->n_outputs == (uint32_t)info->n_commands &&
+                      controller->n_monitors == (uint32_t)block->n_monitors &&
+                      (int64_t)controller->n_parameters == block->n_parameters &&
+                      controller->real_size == (uint32_t)info->real_size &&
+                      controller->period == info->period && block->state_offset % controller->real_size == 0 &&
+                      block->state_offset + states <= controller->context_size &&
+                      same_names(controller->inputs, info->measurement_name, info->n_measurements) &&
+                      same_names(controller->outputs, info->command_name, info->n_commands) &&
+                      same_names(controller->monitors, monitors, block->n_monitors);
     return same ||
            gust_refuse(load, GUST_BAD_CONTROLLER,
                        "the controller in \"%s\" is not the one that \"%s\" was made for: build the model "

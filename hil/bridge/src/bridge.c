@@ -126,6 +126,9 @@ bool gust_bridge_init(gust_bridge *bridge, const gust_bridge_config *config, gus
     if (!bind_signals(bridge, error)) {
         return false;
     }
+    for (uint32_t k = 0; k < GUST_TURNS; ++k) {
+        bridge->taking_turns[k] = gust_message_find(config->messages, TURNS[k], 0);
+    }
     const gust_message *sync = gust_message_find(config->messages, GUST_PART_SYNC, 0);
     bridge->sync_modulus = sync == NULL ? 0 : gust_link_modulus(sync, GUST_FIELD_SAMPLE);
     if (config->synchronous && bridge->sync_modulus == 0) {
@@ -404,7 +407,7 @@ static void want(gust_bridge *bridge, uint32_t periods)
 {
     const gust_supervision *s = &bridge->supervision;
     for (uint32_t k = 0; k < GUST_TURNS; ++k) {
-        const gust_message *message = gust_message_find(bridge->config.messages, TURNS[k], 0);
+        const gust_message *message = bridge->taking_turns[k];
         if (message != NULL && gust_link_due(&bridge->link, message, periods)) {
             bridge->wanted[k] = true;
         }
@@ -438,7 +441,7 @@ static void send_next(gust_bridge *bridge)
         if (!bridge->wanted[k]) {
             continue;
         }
-        const gust_message *message = gust_message_find(bridge->config.messages, TURNS[k], 0);
+        const gust_message *message = bridge->taking_turns[k];
         bridge->wanted[k] = false;
         bridge->turn = k + 1U;
         if (k == TURN_OF_ANSWER) {
@@ -527,9 +530,8 @@ void gust_bridge_stop(gust_bridge *bridge)
 {
     bridge->supervision.state = GUST_STATE_SAFE;
     send_references(bridge);
-    const gust_message *state = gust_message_find(bridge->config.messages, GUST_PART_CONTROLLER_STATE, 0);
-    if (state != NULL) {
-        send_status(bridge, state);
+    if (bridge->taking_turns[TURN_OF_STATE] != NULL) {
+        send_status(bridge, bridge->taking_turns[TURN_OF_STATE]);
     }
 }
 

@@ -83,12 +83,13 @@ typedef struct gust_bridge {
     uint32_t sync_periods; /* since the Sync before */
     uint64_t sync_modulus; /* 0: the database has no Sync */
     uint64_t ticks;
-    uint64_t steps, held;    /* periods in RUN with a step, and without */
-    uint64_t begun;          /* the tick, ns of the transport's clock */
-    uint64_t handed;         /* the tick whose references were handed over last */
-    bool wanted[GUST_TURNS]; /* what waits for its turn */
-    uint32_t turn;           /* who is first in the next period */
-    uint32_t unquiet;        /* periods in which something handed over had not left */
+    uint64_t steps, held;                         /* periods in RUN with a step, and without */
+    uint64_t begun;                               /* the tick, ns of the transport's clock */
+    uint64_t handed;                              /* the tick whose references were handed over last */
+    const gust_message *taking_turns[GUST_TURNS]; /* NULL: the database has none */
+    bool wanted[GUST_TURNS];                      /* what waits for its turn */
+    uint32_t turn;                                /* who is first in the next period */
+    uint32_t unquiet;                             /* periods in which something handed over had not left */
     gust_state told_state;
     uint32_t told_faults;
     _Atomic uint32_t sample; /* number of the last fresh sample */
