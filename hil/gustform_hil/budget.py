@@ -31,7 +31,6 @@ _SLOW = (
     Part.CONTROLLER_FINGERPRINT,
 )
 _ZERO = Fraction(0)
-_AND = ", "  # between the senders of a message
 
 
 @dataclass(frozen=True)
@@ -40,7 +39,7 @@ class Frame:
     `paced`, s: of any two of those frames of its sender that are paced, None if it is not."""
 
     name: str
-    sender: str
+    senders: tuple[str, ...]
     identifier: int
     extended: bool
     fd: bool
@@ -48,6 +47,11 @@ class Frame:
     distance: Fraction
     event: bool
     paced: Fraction | None = None
+
+    @property
+    def sender(self) -> str:
+        """As text."""
+        return ", ".join(self.senders)
 
     @property
     def urgency(self) -> tuple[int, int, int]:
@@ -136,12 +140,11 @@ def budget(name: str, frames: Sequence[Frame], rates: BitRates, assumptions: Ass
 
 def _queue(frame: Frame, queues: Sequence[frozenset[str]]) -> str | None:
     """The plain queue that a frame waits in, by a name."""
-    senders = set(frame.sender.split(_AND))
-    return next(("+".join(sorted(queue)) for queue in queues if senders & queue), None)
+    return next(("+".join(sorted(queue)) for queue in queues if not queue.isdisjoint(frame.senders)), None)
 
 
 def _check_queues(frames: Sequence[Frame], queues: Sequence[frozenset[str]]) -> None:
-    known = {sender for f in frames for sender in f.sender.split(_AND)}
+    known = {sender for f in frames for sender in f.senders}
     named = [sender for queue in queues for sender in sorted(queue)]
     for sender in named:
         if sender not in known or named.count(sender) > 1:
@@ -262,7 +265,7 @@ def _frame(message: Any, event_distance: Fraction, mapped: Fraction | None, pace
         )
     return Frame(
         name=message.name,
-        sender=_AND.join(message.senders) or "anyone",
+        senders=tuple(message.senders) or ("anyone",),
         identifier=message.frame_id,
         extended=message.is_extended_frame,
         fd=message.is_fd,

@@ -115,6 +115,7 @@ def _response(
     """Response, and how long it may wait before it is offered; None: for ever."""
     own = messages[at]
     alone = own.queue is None
+    no_bound = None, _ZERO if alone else None
     if alone:
         own = replace(own, jitter=own.jitter + kept)
     queue = [own] if alone else _queue_of(own, messages)
@@ -123,13 +124,13 @@ def _response(
     for message, offered in zip(messages[:last], late, strict=False):
         if alone or message.queue != own.queue:
             if offered is None:
-                return None, None if own.queue else _ZERO
+                return no_bound
             higher.append((message, offered))
     served = [*queue, *(m for m, _ in higher)]
     destroyed = max(m.time for m in served)
     error = _ERROR_BITS * bus.bit + destroyed
     if load(served) + (error / bus.error_interval if bus.error_interval else _ZERO) >= 1:
-        return None, None if own.queue else _ZERO
+        return no_bound
     blocking = max((m.time for m in messages[last + 1 :]), default=_ZERO)
 
     def errors(t: Fraction) -> Fraction:

@@ -45,7 +45,7 @@ def budget(
     bitrate: Annotated[
         str | None, typer.Option(metavar="RATE", help="of the arbitration [500k with FD frames, else 1M]")
     ] = None,
-    data_bitrate: Annotated[str, typer.Option(metavar="RATE", help="of the data of FD frames")] = "4M",
+    data_bitrate: Annotated[str | None, typer.Option(metavar="RATE", help="of the data of FD frames [4M]")] = None,
     event_distance: Annotated[
         str, typer.Option(metavar="TIME", help="least distance of two messages of a kind that are not cyclic")
     ] = "10 ms",
@@ -124,7 +124,7 @@ def build(
     bitrate: Annotated[
         str | None, typer.Option(metavar="RATE", help="that the messages must fit [500k with FD frames, else 1M]")
     ] = None,
-    data_bitrate: Annotated[str, typer.Option(metavar="RATE", help="of the data of FD frames")] = "4M",
+    data_bitrate: Annotated[str | None, typer.Option(metavar="RATE", help="of the data of FD frames [4M]")] = None,
     allow_overload: Annotated[
         bool, typer.Option("--allow-overload", help="also where messages can miss their deadlines")
     ] = False,

@@ -49,7 +49,7 @@ class Request:
     dbc: Path | None = None
     mapping: Path | None = None
     bitrate: str | None = None
-    data_bitrate: str = "4M"
+    data_bitrate: str | None = None
     event_distance: str = "10 ms"
     jitter: str = "0"
     errors_every: str | None = None
@@ -85,11 +85,12 @@ def traffic(request: Request) -> Traffic:
 
 
 def budget_of(request: Request) -> Budget:
-    """The budget at the bit rates that are asked for: 500 kbit/s with FD frames, else 1 Mbit/s, unless told."""
+    """The budget at the bit rates that are asked for: unless told, 500 kbit/s and 4 Mbit/s with FD frames, else 1."""
     found = traffic(request)
     fd = any(frame.fd for frame in found.frames)
     nominal = bit_rate(request.bitrate or ("500k" if fd else "1M"))
-    rates = BitRates(nominal, bit_rate(request.data_bitrate) if fd else nominal)
+    data = "4M" if request.data_bitrate is None else request.data_bitrate
+    rates = BitRates(nominal, bit_rate(data) if fd else nominal)
     return budget(found.name, found.frames, rates, found.assumptions)
 
 

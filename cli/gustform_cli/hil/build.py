@@ -40,7 +40,7 @@ class Options:
     mapping: Path | None = None
     period: str | None = None
     bitrate: str | None = None
-    data_bitrate: str = "4M"
+    data_bitrate: str | None = None
     allow_overload: bool = False
     compile: bool = True
     overrides: Sequence[str] = ()

@@ -22,7 +22,7 @@ def shipped(name: str) -> list[Frame]:
 
 
 def frame(name: str, identifier: int, length: int = 8, cycle_ms: int = 10, extended: bool = False) -> Frame:
-    return Frame(name, "A", identifier, extended, False, length, Fraction(cycle_ms, 1000), event=False)
+    return Frame(name, ("A",), identifier, extended, False, length, Fraction(cycle_ms, 1000), event=False)
 
 
 @pytest.mark.parametrize(("name", "rates"), [("fd", SLOW), ("fd", FAST), ("classic", CLASSIC)])
