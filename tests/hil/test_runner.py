@@ -141,11 +141,14 @@ def test_a_signal_reaches_the_command_which_ends_in_its_own_way(number: signal.S
     assert guests(place) == []
 
 
-def test_a_signal_during_the_boot_ends_the_guest(place: Path) -> None:
+@pytest.mark.parametrize("part", [0.0, 0.2, 0.4, 0.6, 0.8])
+def test_a_signal_during_the_boot_ends_the_guest(part: float, place: Path) -> None:
+    """At some moments user-mode Linux leaves a stopped process behind when it is told to end."""
     with subprocess.Popen(arguments("sleep", "1000")) as process:
         deadline = time.monotonic() + TIMEOUT
         while len(guests(place)) < 2 and time.monotonic() < deadline:
             time.sleep(0.01)
+        time.sleep(part)
         process.terminate()
         assert process.wait(TIMEOUT) == 128 + signal.SIGTERM
     assert guests(place) == []
@@ -160,6 +163,21 @@ def test_a_killed_runner_leaves_no_guest_behind(place: Path) -> None:
     while len(guests(place)) > 1 and time.monotonic() < deadline:
         time.sleep(0.05)
     assert len(guests(place)) == 1  # its folder: nobody was left to remove it
+
+
+def test_a_killed_guest_takes_its_processes_along_and_is_said(place: Path) -> None:
+    """Were they let go, their system calls would reach the host, and the pipes they hold the runner for ever."""
+    program = "echo waiting; while :; do echo running >>written; done"
+    words, pipe = arguments("sh", "-c", program), subprocess.PIPE
+    with subprocess.Popen(words, stdout=pipe, stderr=pipe, text=True, cwd=place.parent) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "waiting\n"
+        (guest,) = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+        os.kill(int(guest), signal.SIGKILL)
+        _, said = process.communicate(timeout=TIMEOUT)
+    assert process.returncode == 125
+    assert "the guest ended without an exit code" in said
+    assert guests(place) == []
 
 
 def test_a_reader_that_goes_away_ends_an_endless_command() -> None:

@@ -1,10 +1,16 @@
-/* Preloaded into linux.uml where the processor has more state than it knows: AMX, 11,008 bytes and not 2,696.
+/* Preloaded into linux.uml: what its calls of ptrace need and do not have.
  *
- * Debian 12's user-mode Linux hands a process's vector registers to PTRACE_SETREGSET in an area of fixed size,
- * and the host's kernel takes only an area of exactly its own size: EFAULT, and the guest panics at its first
- * process. This wrapper lays UML's area at the head of one of full size. Components that have no room in UML's
- * area are marked as unused in the header's bit field, so the processor gives them their initial values:
- * nothing of one guest process is seen by another. Reading needs no help, the host fills what fits. */
+ * The end of its processes with it. Each process of a guest is one of the host that linux.uml traces, and
+ * system calls of the guest's programs are held up there. Were linux.uml killed, they would be let go: some
+ * stay stopped for good and hold the runner's pipes open, others go on and their system calls reach the host's
+ * kernel. PTRACE_O_EXITKILL has the host's kernel kill them with their tracer.
+ *
+ * Vector registers, where the processor has more state than it knows: AMX, 11,008 bytes and not 2,696. Debian
+ * 12's user-mode Linux hands them to PTRACE_SETREGSET in an area of fixed size, and the host's kernel takes
+ * only an area of exactly its own size: EFAULT, and the guest panics at its first process. This wrapper lays
+ * UML's area at the head of one of full size. Components that have no room in UML's area are marked as unused
+ * in the header's bit field, so the processor gives them their initial values: nothing of one guest process is
+ * seen by another. Reading needs no help, the host fills what fits. */
 #define _GNU_SOURCE
 #include <cpuid.h>
 #include <dlfcn.h>
@@ -21,7 +27,8 @@ enum {
     XSAVE_USED_AT = 512,      /* XSTATE_BV: which components hold other than their initial values */
     XSAVE_FIRST_EXTENDED = 2, /* components 0 and 1, x87 and SSE, lie in the area's fixed head */
     XSAVE_COMPONENTS = 63,
-    LARGEST_AREA = 65536
+    LARGEST_AREA = 65536,
+    OLD_SETOPTIONS = 21 /* the number by which UML still asks; its options have kept their values */
 };
 
 typedef long ptrace_function(enum __ptrace_request request, ...);
@@ -88,6 +95,10 @@ long ptrace(enum __ptrace_request request, ...)
             wanted <= LARGEST_AREA) {
             return set_wide(real, process, address, area, wanted);
         }
+    }
+    if (request == PTRACE_SETOPTIONS || (int)request == OLD_SETOPTIONS) {
+        return real(PTRACE_SETOPTIONS, process, address,
+                    (void *)((uintptr_t)data | (uintptr_t)PTRACE_O_EXITKILL));
     }
     return real(request, process, address, data);
 }
