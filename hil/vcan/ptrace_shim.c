@@ -97,8 +97,8 @@ long ptrace(enum __ptrace_request request, ...)
         }
     }
     if (request == PTRACE_SETOPTIONS || (int)request == OLD_SETOPTIONS) {
-        return real(PTRACE_SETOPTIONS, process, address,
-                    (void *)((uintptr_t)data | (uintptr_t)PTRACE_O_EXITKILL));
+        const uintptr_t options = (uintptr_t)data | (uintptr_t)PTRACE_O_EXITKILL;
+        return real(PTRACE_SETOPTIONS, process, address, options);
     }
     return real(request, process, address, data);
 }
