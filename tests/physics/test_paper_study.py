@@ -280,9 +280,10 @@ def test_interrupted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with xarray.open_dataset(out / "cases" / "gfl_8.nc") as data:
         assert data.attrs["status"] == "completed"
         assert data["time"].values[-1] == 90.0
+        rows = data.sizes["time"]
     with xarray.open_dataset(out / "cases" / "gfm_mppt_8.nc") as data:
         assert data.attrs["status"] == "interrupted"
-        assert data["time"].values[-1] < 90.0
+        assert data.sizes["time"] < rows  # none if the machine was so busy that it had hardly begun
     assert not (out / "cases" / "gfm_fr_12.nc").exists()
 
 

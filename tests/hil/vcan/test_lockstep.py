@@ -31,10 +31,10 @@ from gustform_hil.process import UNHURRIED, Bridge
 from gustform_hil.rig_files import RigFiles
 from gustform_hil.trace import read_trace
 from tests.support.rigs import SCHEDULE
+from tests.support.waiting import PATIENCE, wait_for
 
 STEPS = 20_000
 SAMPLED = ["wt.control.sampled=1ms", "wt.control.delay=1"]
-PATIENCE = 120.0  # s, for a process that builds its model in a second or two
 FLOAT32 = 2.0**-24  # relative: half a unit in the last place
 
 
@@ -156,9 +156,10 @@ def test_candump_of_can_utils_writes_the_same(rig: RigFiles, interface: str, tmp
     with (tmp_path / "candump.log").open("wb") as file:
         other = subprocess.Popen(["candump", "-L", "-r", str(4 << 20), interface], stdout=file)
         try:
-            time.sleep(1.0)
+            listeners = Path("/proc/net/can/rcvlist_all")
+            wait_for(lambda: f"({interface}: no entry)" not in listeners.read_text())
             done = on_the_bus(rig, interface, tmp_path, settings(0.3, "1ms"), tmp_path / "own.log")
-            time.sleep(0.5)
+            time.sleep(1.0)  # it has a queue, and reads on
         finally:
             other.terminate()
             other.wait()
@@ -187,16 +188,17 @@ def test_an_mf4_log_of_a_classic_bus(rig_for: object, interface: str, tmp_path: 
     assert found.good, [pair.compared for pair in found.pairs if not pair.compared.good]
 
 
+def state(bridge: Bridge) -> object:
+    """The last one that it has told."""
+    return [event["state"] for event in bridge.events if event["event"] == "state"][-1]
+
+
 @contextmanager
 def when(bridge: Bridge, state: str, action: Callable[[], None]) -> Iterator[None]:
     """Do something from a thread, half a second after the bridge has come to a state."""
 
     def watch() -> None:
-        deadline = time.monotonic() + PATIENCE
-        while not any(event.get("state") == state for event in bridge.events):
-            if time.monotonic() > deadline:
-                return
-            time.sleep(0.05)
+        wait_for(lambda: any(event.get("state") == state for event in bridge.events))
         time.sleep(0.5)
         action()
 
@@ -230,7 +232,7 @@ def test_interrupted_everything_is_readable_and_nothing_is_commanded(
     with Bridge(rig.bridge, interface, "sync", UNHURRIED) as bridge:
         with when(bridge, "RUN", lambda: process.send_signal(signal.SIGINT)):
             output, words = process.communicate(timeout=2.0 * PATIENCE)
-        assert [event["state"] for event in bridge.events if event["event"] == "state"][-1] in ("READY", "SAFE")
+        wait_for(lambda: state(bridge) in ("READY", "SAFE"))
     assert process.returncode == 130, words
     assert "interrupted" in output
     with RunData(tmp_path / "result.nc") as run:
@@ -247,10 +249,8 @@ def test_the_bridge_is_stopped_before_the_figure_is_drawn(
     drawn: list[object] = []
 
     def after_the_run(result: Path, figure: Path) -> Path:
-        deadline = time.monotonic() + PATIENCE
-        while (state := bridge.events[-1].get("state")) == "RUN" and time.monotonic() < deadline:
-            time.sleep(0.01)
-        drawn.append(state)
+        wait_for(lambda: state(bridge) != "RUN")
+        drawn.append(state(bridge))
         return draw(result, figure)
 
     monkeypatch.setattr("gustform_cli.figures.draw", after_the_run)

@@ -6,7 +6,7 @@ import json
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -19,8 +19,8 @@ from gustform_hil.locate import bridge_folder
 from gustform_hil.process import UNHURRIED, Bridge
 from gustform_hil.rig_files import RigFiles
 from gustform_runtime.locate import include_dir
+from tests.support.waiting import PATIENCE, wait_for
 
-PATIENCE = 120.0  # s, until something happens that takes a second on a machine of its own
 SECONDS = 3.0  # of running, some thousand samples
 SAMPLES = 100  # that even a busy machine makes of them
 
@@ -88,13 +88,6 @@ def test_plant_and_controller_in_lock_step(
     assert not told(bridge, "SAFE")
     assert bridge.events[-1]["steps"] >= SAMPLES
     assert bridge.events[-1]["held"] == 0
-
-
-def wait_for(condition: Callable[[], bool]) -> None:
-    limit = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < limit
-        time.sleep(0.05)
 
 
 def test_latency(programs: Path, bridge: Bridge, interface: str) -> None:
