@@ -5,7 +5,7 @@
     result.nc.checkpoint    everything else: solver and statistics, rows of the block that is not full, watches
 
 The file is replaced in one go after the other two have reached the disk. It says how much of them counts: what came
-later is cut off when the run goes on. HDF5's own directory of a file that was open when its process died need not be
+later is cut off when the run goes on. HDF5's own directory of a file that was open when the power failed need not be
 whole; the copy of the places in `chunks` is, so the rows are found without it. G counts how often the run was resumed.
 """
 

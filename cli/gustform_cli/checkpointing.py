@@ -12,6 +12,7 @@ from gustform.language.errors import GustformError
 from gustform_cli import checkpoint as files
 from gustform_cli.assemble import Assembled
 from gustform_cli.checkpoint import Checkpoint
+from gustform_cli.journalled_file import in_use
 from gustform_cli.result import ResultWriter
 from gustform_cli.rows import RowBlocks
 from gustform_cli.versions import versions
@@ -123,13 +124,19 @@ class Keeper:
         """Copy the rows of a run that ended into the new result, and make that the one to go on from.
 
         The old file stays until the new one and a checkpoint that belongs to it are on the disk: at whatever moment
-        this ends, the run can be resumed. GF7008 if the rows are not there.
+        this ends, the run can be resumed. GF7008 if the rows are not there, or if it goes on still.
         """
         folder, generation = self._result.parent, found.generation
         old = _rows_of(self._result, generation)
         places_file = files.chunks_file(self._result, generation)
         try:
             with old.open("rb") as source:
+                if in_use(source):
+                    raise GustformError(
+                        "GF7008",
+                        f"the run cannot go on from {str(old)!r}: it still runs",
+                        hint="waiting, or its Ctrl-C",
+                    )
                 for first in range(0, found.blocks, _BATCH):
                     wanted = min(_BATCH, found.blocks - first)
                     places = files.read_places(places_file, found.variables, first, wanted)

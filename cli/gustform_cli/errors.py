@@ -22,7 +22,7 @@ GF6901 worker process died      GF6902 defect in a case
 GF7001 result folder not writable   GF7002 result cannot be read   GF7003 file exists already
 GF7004 folder in use by another sweep
 GF7006 no checkpoint here          GF7007 checkpoint of another model or version
-GF7008 checkpoint damaged
+GF7008 run cannot go on: checkpoint damaged, or still running
 """
 
 from __future__ import annotations

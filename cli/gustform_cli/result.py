@@ -2,7 +2,8 @@
 
 Every channel is a variable over `time` with its unit and sentence; those of a component that stands there several
 times (`count`) share one variable over time and the component's number. The file is called result.nc.part until the
-run is over, completed or not, and is whole after every block: what a killed run leaves can be opened and plotted.
+run is over, completed or not, and is whole at any moment (journalled_file.py): what a killed run leaves can be opened
+and plotted.
 
 The time dimension has an upper bound (the rows the run can give) instead of none: for unlimited dimensions h5netcdf
 asks all variables for their length, each time anybody asks one, which takes 40 s with 300 variables.
@@ -11,6 +12,7 @@ asks all variables for their length, each time anybody asks one, which takes 40 
 from __future__ import annotations
 
 import errno
+import functools
 import json
 import os
 import re
@@ -25,6 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gustform.language.errors import GustformError
+from gustform_cli.journalled_file import JournalledFile
 
 if TYPE_CHECKING:
     import h5py
@@ -33,6 +36,7 @@ RESULT = "result.nc"
 PARTIAL = f"{RESULT}.part"
 
 _ROOM = 256 << 10  # bytes beyond a block, for what HDF5 keeps beside it and for closing the file
+_ROOM_OF_ONE = 8 << 10  # bytes for each variable: a page of its directory, in the journal and in the file
 _COMPRESSED_FROM = 16 << 20  # bytes; below, the time is worth more than the space
 
 _INSTANCE = re.compile(r"(?P<component>[^.\[]+)\[(?P<number>\d+)\](?P<rest>\..*)")
@@ -117,28 +121,30 @@ class ResultWriter:
         self.path = folder / (part or f"{name}.part")
         self.rows = 0
         self._final = folder / name
-        self._room = _ROOM + closing
         self._variables = arrange(quantities, counts)
+        self._room = _ROOM + _ROOM_OF_ONE * len(self._variables) + closing
         # A block is a chunk: it is written once, and HDF5 has nothing to keep that would grow with the run.
         self._chunk_rows = min(block_rows, most_rows)
         self._type = np.dtype(precision)
         self._compressed = self._type.itemsize * most_rows * len(quantities) > _COMPRESSED_FROM
         widest = max((v.columns.size for v in self._variables), default=1)
         try:
-            with self.path.open("wb"):
-                pass
-            self._look_for_room(0)
-            self._file = h5py.File(self.path, "w", track_order=True, rdcc_nbytes=8 * self._chunk_rows * widest)
-            self._create(attributes, most_rows)
+            self._disk = JournalledFile(self.path)
         except OSError as error:
             raise _not_written(self.path, error) from None
+        try:
+            self._look_for_room(0)
+            self._file = h5py.File(self._disk, "w", track_order=True, rdcc_nbytes=8 * self._chunk_rows * widest)
+            self._create(attributes, most_rows)
+        except (OSError, GustformError) as error:
+            self.path.unlink(missing_ok=True)
+            raise (_not_written(self.path, error) if isinstance(error, OSError) else error) from None
 
     def _create(self, attributes: Mapping[str, str], most_rows: int) -> None:
         for name, text in {"Conventions": "CF-1.10", **attributes, "status": "running"}.items():
             self._file.attrs[name] = text
         self._time = self._scale("time", np.empty(0), most_rows)
-        self._time.attrs["units"] = "s"
-        self._time.attrs["long_name"] = "simulated time"
+        _describe(self._time, "s", "simulated time")
         numbers: dict[str, h5py.Dataset] = {}
         self._datasets: list[h5py.Dataset] = []
         for variable in self._variables:
@@ -157,13 +163,12 @@ class ResultWriter:
                 compression_opts=1 if self._compressed else None,
                 shuffle=self._compressed,
             )
-            dataset.attrs["units"] = variable.quantity.unit
-            dataset.attrs["long_name"] = variable.quantity.description
+            _describe(dataset, variable.quantity.unit, variable.quantity.description)
             dataset.dims[0].attach_scale(self._time)
             if dimension is not None:
                 dataset.dims[1].attach_scale(numbers[dimension])
             self._datasets.append(dataset)
-        self._file.flush()
+        self._commit()
 
     def _scale(self, name: str, values: NDArray[Any], most: int) -> h5py.Dataset:
         """A dimension with its coordinate variable."""
@@ -182,10 +187,15 @@ class ResultWriter:
             for variable, dataset in zip(self._variables, self._datasets, strict=True):
                 block = rows[:, variable.columns] if variable.dimension else rows[:, variable.columns[0]]
                 self._write(dataset, block, self._compressed)
-            self._file.flush()
+            self._commit()
         except OSError as error:
             raise _not_written(self.path, error) from None
         self.rows = end
+
+    def _commit(self) -> None:
+        """What there is now is what a killed run leaves."""
+        self._file.flush()
+        self._disk.commit()
 
     def _look_for_room(self, rows: int) -> None:
         """GF7001 if the disk has no room for a block and for closing the file after it.
@@ -246,9 +256,7 @@ class ResultWriter:
     def sync(self) -> None:
         """See to it that the disk has all blocks. GF7001 when it cannot be."""
         try:
-            self._file.flush()
-            with self.path.open("rb") as written:
-                os.fsync(written.fileno())
+            self._disk.sync()
         except OSError as error:
             raise _not_written(self.path, error) from None
 
@@ -265,18 +273,19 @@ class ResultWriter:
                     dataset.id.set_extent((self.rows + self._chunk_rows, *dataset.shape[1:]))
                     dataset.id.write_direct_chunk((self.rows, *[0] * (dataset.ndim - 1)), data)
                 self.rows += self._chunk_rows
-            self._file.flush()
+            self._commit()
         except OSError as error:
             raise _not_written(self.path, error) from None
 
     def abandon(self) -> None:
         """Close the file and remove it."""
         self._file.close()
+        self._disk.close()
         self.path.unlink(missing_ok=True)
 
     def rename(self, path: Path) -> None:
         """Give the open file another name."""
-        self.path = self.path.replace(path)
+        self.path = self._disk.path = self.path.replace(path)
 
     def finish(
         self, status: str, statistics: Mapping[str, Any], add: Callable[[h5py.File], None] | None = None
@@ -289,16 +298,34 @@ class ResultWriter:
             self._file.attrs["status"] = status
             self._file.attrs["statistics"] = json.dumps(statistics)
             self._file.close()
-            with self.path.open("rb") as written:
-                os.fsync(written.fileno())
+            self._disk.commit()
+            self._disk.sync()
+            self._disk.close()
             self.path.replace(self._final)
         except OSError as error:
             raise _not_written(self.path, error) from None
         return self._final
 
 
+@functools.cache
+def _text() -> tuple[Any, h5py.h5t.TypeID, h5py.h5s.SpaceID]:
+    from h5py import h5s, h5t, string_dtype
+
+    return string_dtype(), h5t.py_create(string_dtype(), logical=True), h5s.create(h5s.SCALAR)
+
+
+def _describe(dataset: h5py.Dataset, unit: str, description: str) -> None:
+    """Unit and sentence of a variable. By h5py's lower level: `attrs` would take a fifth of a short run's file."""
+    from h5py import h5a
+
+    kind, stored, one = _text()
+    for name, text in ((b"units", unit), (b"long_name", description)):
+        h5a.create(dataset.id, name, stored, one).write(np.array(text, kind))
+
+
 def _not_written(path: Path, error: OSError) -> GustformError:
     reason = error.strerror or str(error).splitlines()[0]
-    return GustformError(
-        "GF7001", f"the result {str(path)!r} cannot be written; {reason}", hint="--out with a folder that has space"
+    hint = (
+        "--out with a folder of its own" if isinstance(error, BlockingIOError) else "--out with a folder that has space"
     )
+    return GustformError("GF7001", f"the result {str(path)!r} cannot be written; {reason}", hint=hint)

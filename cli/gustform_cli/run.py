@@ -231,8 +231,6 @@ class Run:
 
     def _new_writer(self) -> ResultWriter:
         assert self.file is not None
-        if self._resume is None:
-            discard(self.file)
         writer = ResultWriter(
             self.file.parent,
             [Quantity(channel.name, channel.unit, channel.description) for channel in self.model.channels],
@@ -245,6 +243,8 @@ class Run:
             part=None if self._resume is None else new_part(self.file, self._resume),
             closing=self.plan.size,
         )
+        if self._resume is None:  # not before: the folder may be that of a run that goes on, which the writer refuses
+            discard(self.file)
         if math.isfinite(self._between):
             self._keeper = Keeper(self.model.assembled, self.file, writer, self.block_rows)
         return writer

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gustform.language.errors import GustformError
+from gustform_cli.journalled_file import complete
 
 if TYPE_CHECKING:
     import h5py
@@ -36,6 +37,7 @@ class RunData:
         import h5py
 
         self.path = file
+        complete(file)
         try:
             self._file = h5py.File(file, "r")
         except OSError as error:

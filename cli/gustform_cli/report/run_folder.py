@@ -12,6 +12,7 @@ from typing import Any
 
 from gustform.language.errors import GustformError
 from gustform_cli.document import parse
+from gustform_cli.journalled_file import complete
 from gustform_cli.result import PARTIAL, RESULT
 
 SUMMARY = "summary.json"
@@ -89,6 +90,7 @@ def read_run(folder: Path) -> RunFolder:
 def _attributes(result: Path) -> dict[str, str]:
     import h5py
 
+    complete(result)
     with h5py.File(result, "r") as file:
         return {name: str(file.attrs[name]) for name in (*_TEXTS, *_JSONS) if name in file.attrs}
 

@@ -11,6 +11,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import xarray
 from typer.testing import CliRunner, Result
@@ -191,6 +192,25 @@ def test_a_killed_run_can_be_plotted(tmp_path: Path) -> None:
     plotted = gustform("plot", tmp_path / "result.nc.part", "--out", tmp_path / "part.png")
     assert plotted.returncode == 0, plotted.stderr
     assert (tmp_path / "part.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_run_is_not_disturbed_by_another_one_in_its_folder(tmp_path: Path) -> None:
+    process = start_long_run(tmp_path)
+    for arguments, code in (
+        (["simulate", LOAD_STEP, "--out", tmp_path], "GF7001"),
+        (["simulate", "--resume", tmp_path], "GF7008"),
+    ):
+        other = gustform(*arguments)
+        assert other.returncode == 2, other.stderr
+        assert code in other.stderr
+    assert process.poll() is None
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 130, err
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names == {"result.nc", "result.nc.checkpoint", "result.nc.chunks.0", "summary.json"}
+    with xarray.open_dataset(tmp_path / "result.nc") as data:
+        assert np.array_equal(data["time"].values[:-1], np.arange(data.sizes["time"] - 1))
 
 
 def test_ctrl_c_before_the_run_touches_nothing(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ import pytest
 import xarray
 
 from gustform.language.errors import GustformError
+from gustform_cli.journalled_file import complete
 from gustform_cli.result import PARTIAL, RESULT, Quantity, ResultWriter, prepare_folder
 
 QUANTITIES = [
@@ -48,7 +49,8 @@ def test_opens_in_xarray(tmp_path: Path) -> None:
         assert len(data.attrs["scenario"]) == 200_000
 
 
-def test_a_killed_run_leaves_a_readable_file(tmp_path: Path) -> None:
+@pytest.mark.parametrize("blocks", [3, 20, 40, 90])
+def test_a_killed_run_leaves_a_readable_file(tmp_path: Path, blocks: int) -> None:
     script = f"""
 import sys
 sys.path.insert(0, {str(Path(__file__).parent)!r})
@@ -64,11 +66,12 @@ for first in range(0, 1_000_000, 1000):
     with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, env=environment) as process:
         assert process.stdout is not None
         written = 0
-        for _ in range(20):
+        for _ in range(blocks):
             written = int(process.stdout.readline())
         process.send_signal(signal.SIGKILL)
+    complete(tmp_path / PARTIAL)
     with xarray.open_dataset(tmp_path / PARTIAL, engine="h5netcdf") as data:
-        assert data.sizes["time"] >= written - 1000
+        assert data.sizes["time"] >= written
         assert data.attrs["status"] == "running"
         assert np.array_equal(data["sg.frequency"].values, data["time"].values.astype(np.float32))
 
@@ -96,3 +99,15 @@ def test_a_full_disk_is_an_error_of_ours(tmp_path: Path) -> None:
     with pytest.raises(GustformError) as caught:
         ResultWriter(tmp_path, QUANTITIES, {"wt": 3}, 1000, 1000, {})
     assert caught.value.code == "GF7001"
+
+
+def test_the_file_of_another_writer_is_left_alone(tmp_path: Path) -> None:
+    writer = ResultWriter(tmp_path, QUANTITIES, {"wt": 3}, 10_000, 1000, {})
+    writer.append(*rows(0, 1000))
+    with pytest.raises(GustformError, match="another process has it open") as caught:
+        ResultWriter(tmp_path, QUANTITIES, {"wt": 3}, 10_000, 1000, {})
+    assert caught.value.code == "GF7001"
+    writer.append(*rows(1000, 1000))
+    with xarray.open_dataset(writer.finish("completed", {})) as data:
+        assert np.array_equal(data["sg.frequency"].values, data["time"].values.astype(np.float32))
+        assert data.sizes["time"] == 2000

@@ -1,0 +1,189 @@
+"""A file that goes from one whole state to the next, at whatever moment its process is killed.
+
+HDF5 changes its directory in place: the extents of the variables, the index of their chunks, the end of the file. A
+process that is killed between two of these writes leaves a file whose parts do not belong together. So HDF5 writes
+into a `JournalledFile`: what lies behind the last whole state goes to the disk at once, nothing refers to it yet; pages
+of that state which change are kept in memory. `commit` writes them beside the file first, then into it:
+
+    FILE           the last whole state, or between two of them while FILE.redo is there and whole
+    FILE.redo      digest of what follows; length of the file; numbers of the pages; the pages. All numbers are u64, LE
+
+This is a redo log, as databases have it. `complete` does what the one that was killed had left to do.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import os
+import struct
+from pathlib import Path
+from typing import BinaryIO
+
+_PAGE = 4096
+_DIGEST = hashlib.sha256().digest_size
+
+
+class JournalledFile:
+    """What h5py takes for a file that it may read and write. OSError where the disk refuses, or when it is in use."""
+
+    def __init__(self, path: Path) -> None:
+        """An empty file, in the place of one that was there; no other process may write to it or read it as HDF5."""
+        self.path = path
+        self._stream = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT, 0o666), "r+b", buffering=0)
+        self._file = self._stream.fileno()
+        _lock(self._file)
+        os.ftruncate(self._file, 0)
+        _redo(path).unlink(missing_ok=True)
+        self._place = 0
+        self._size = 0
+        self._border = 0  # end of the last page that has bytes of the last whole state
+        self._pages: dict[int, bytearray] = {}  # before it, as they will be in the next state
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
+        """Go to a place."""
+        if whence == os.SEEK_END:
+            offset += self._size
+        elif whence == os.SEEK_CUR:
+            offset += self._place
+        self._place = offset
+        return offset
+
+    def tell(self) -> int:
+        """The place."""
+        return self._place
+
+    def readinto(self, buffer: memoryview) -> int:
+        """As many bytes from here as the buffer takes or the file has."""
+        count = max(0, min(len(buffer), self._size - self._place))
+        data = bytearray(os.pread(self._file, count, self._place).ljust(count, b"\0"))
+        for number in self._numbers(self._place, count):
+            if number in self._pages:
+                at = number * _PAGE - self._place
+                begin, end = max(at, 0), min(at + _PAGE, count)
+                data[begin:end] = self._pages[number][begin - at : end - at]
+        buffer[:count] = data
+        self._place += count
+        return count
+
+    def read(self, count: int) -> bytes:
+        """At most so many bytes from here."""
+        data = bytearray(count)
+        return bytes(data[: self.readinto(memoryview(data))])
+
+    def write(self, data: memoryview) -> int:
+        """Put bytes here: into pages of the last whole state, and on the disk behind them."""
+        place, count = self._place, len(data)
+        inside = min(count, self._border - place)
+        for number in self._numbers(place, inside):
+            at = number * _PAGE - place
+            begin, end = max(at, 0), min(at + _PAGE, count)
+            self._page(number)[begin - at : end - at] = data[begin:end]
+        if inside < count:
+            behind = max(inside, 0)
+            _put(self._file, data[behind:], place + behind)
+        self._place = place + count
+        self._size = max(self._size, self._place)
+        return count
+
+    def truncate(self, size: int) -> int:
+        """The length that the file will have; the disk has it after `commit`."""
+        self._size = size
+        return size
+
+    def flush(self) -> None:
+        """HDF5 asks for it more often than its file is whole: nothing."""
+
+    def commit(self) -> None:
+        """What has been written is the next whole state."""
+        pages = sorted((number, page) for number, page in self._pages.items() if number * _PAGE < self._size)
+        redo = _redo(self.path)
+        if pages:
+            numbers = struct.pack(f"<{len(pages)}Q", *(number for number, _ in pages))
+            text = struct.pack("<2Q", self._size, len(pages)) + numbers + b"".join(page for _, page in pages)
+            redo.write_bytes(hashlib.sha256(text).digest() + text)
+        _carry_out(self._file, self._size, pages)
+        redo.unlink(missing_ok=True)
+        self._border = -(-self._size // _PAGE) * _PAGE
+        self._pages.clear()
+
+    def sync(self) -> None:
+        """See to it that the disk has what was committed."""
+        os.fsync(self._file)
+
+    def close(self) -> None:
+        """Close it as it is; what was not committed is gone."""
+        self._stream.close()
+
+    @staticmethod
+    def _numbers(place: int, count: int) -> range:
+        """Of the pages that some bytes lie in."""
+        return range(place // _PAGE, -(-(place + count) // _PAGE)) if count > 0 else range(0)
+
+    def _page(self, number: int) -> bytearray:
+        if number not in self._pages:
+            self._pages[number] = bytearray(os.pread(self._file, _PAGE, number * _PAGE).ljust(_PAGE, b"\0"))
+        return self._pages[number]
+
+
+def complete(path: Path) -> None:
+    """Carry out what a killed process had written down and not done, if it did; nothing if another one still writes to
+    the file, or this one may not."""
+    redo = _redo(path)
+    if not redo.exists():
+        return
+    try:
+        file = os.open(path, os.O_RDWR)
+    except OSError:
+        return
+    try:
+        _lock(file)
+        data = redo.read_bytes()
+        if hashlib.sha256(data[_DIGEST:]).digest() == data[:_DIGEST]:
+            size, count = struct.unpack_from("<2Q", data, _DIGEST)
+            numbers = struct.unpack_from(f"<{count}Q", data, _DIGEST + 16)
+            pages = memoryview(data)[_DIGEST + 16 + 8 * count :]
+            _carry_out(file, size, [(n, pages[k * _PAGE : (k + 1) * _PAGE]) for k, n in enumerate(numbers)])
+        redo.unlink()
+    except OSError:
+        return
+    finally:
+        os.close(file)
+
+
+def in_use(stream: BinaryIO) -> bool:
+    """Whether another process writes to this file."""
+    try:
+        fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False  # a file system without locks
+    fcntl.flock(stream, fcntl.LOCK_UN)
+    return False
+
+
+def _redo(path: Path) -> Path:
+    return path.with_name(f"{path.name}.redo")
+
+
+def _lock(file: int) -> None:
+    """As HDF5 locks the files that it opens itself; BlockingIOError. Some file systems have no locks."""
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        raise BlockingIOError(error.errno, "another process has it open") from None
+    except OSError:
+        pass
+
+
+def _carry_out(file: int, size: int, pages: list[tuple[int, bytearray]] | list[tuple[int, memoryview]]) -> None:
+    for number, page in pages:
+        _put(file, memoryview(page), number * _PAGE)
+    os.ftruncate(file, size)
+
+
+def _put(file: int, data: memoryview, at: int) -> None:
+    while data:
+        written = os.pwrite(file, data, at)
+        data, at = data[written:], at + written
