@@ -32,8 +32,12 @@ class JournalledFile:
         self.path = path
         self._stream = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT, 0o666), "r+b", buffering=0)
         self._file = self._stream.fileno()
-        _lock(self._file)
-        os.ftruncate(self._file, 0)
+        try:
+            _lock(self._file)
+            os.ftruncate(self._file, 0)
+        except OSError:
+            self._stream.close()
+            raise
         _redo(path).unlink(missing_ok=True)
         self._place = 0
         self._size = 0

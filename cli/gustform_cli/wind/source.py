@@ -163,7 +163,7 @@ def _turbulence_series(block: TurbulentWindBlock, site: Site, number: int, t_end
         name=f"wind of {site.instances[number - 1]}",
         operating_value=block.mean,
         dt=block.every,
-        on_end=block.on_end,
+        on_end=block.on_end if math.isfinite(t_end) else "error",  # without a duration there is no end
         t_end=t_end,
     )
     return WindSource(series, reader, warnings)

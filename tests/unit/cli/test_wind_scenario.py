@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 import sys
 from pathlib import Path
@@ -156,6 +157,15 @@ def test_mann_without_hipersim_says_what_to_install(monkeypatch: pytest.MonkeyPa
 def test_turbulence_of_kaimal_never_asks_for_hipersim(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "hipersim", None)
     assert faults("{type: turbulence, mean: 8 m/s}") == []
+
+
+@pytest.mark.parametrize("on_end", ["error", "hold", "repeat"])
+def test_turbulence_without_a_duration_has_no_end(on_end: str) -> None:
+    """`on_end` says nothing then; the runtime would refuse to repeat what is endless."""
+    endless = series(made(f"{{type: turbulence, mean: 8 m/s, on_end: {on_end}}}"))
+    assert (endless.t_end, endless.on_end) == (math.inf, "error")
+    ending = series(made(f"{{type: turbulence, mean: 8 m/s, duration: 20 s, on_end: {on_end}}}"))
+    assert (ending.t_end, ending.on_end) == (20.0, on_end)
 
 
 def test_mann_turbulence() -> None:
