@@ -188,7 +188,7 @@ def test_an_mf4_log_of_a_classic_bus(rig_for: object, interface: str, tmp_path: 
     assert found.good, [pair.compared for pair in found.pairs if not pair.compared.good]
 
 
-def state(bridge: Bridge) -> object:
+def last_state(bridge: Bridge) -> object:
     """The last one that it has told."""
     return [event["state"] for event in bridge.events if event["event"] == "state"][-1]
 
@@ -232,7 +232,7 @@ def test_interrupted_everything_is_readable_and_nothing_is_commanded(
     with Bridge(rig.bridge, interface, "sync", UNHURRIED) as bridge:
         with when(bridge, "RUN", lambda: process.send_signal(signal.SIGINT)):
             output, words = process.communicate(timeout=2.0 * PATIENCE)
-        wait_for(lambda: state(bridge) in ("READY", "SAFE"))
+        wait_for(lambda: last_state(bridge) in ("READY", "SAFE"))
     assert process.returncode == 130, words
     assert "interrupted" in output
     with RunData(tmp_path / "result.nc") as run:
@@ -249,8 +249,8 @@ def test_the_bridge_is_stopped_before_the_figure_is_drawn(
     drawn: list[object] = []
 
     def after_the_run(result: Path, figure: Path) -> Path:
-        wait_for(lambda: state(bridge) != "RUN")
-        drawn.append(state(bridge))
+        wait_for(lambda: last_state(bridge) != "RUN")
+        drawn.append(last_state(bridge))
         return draw(result, figure)
 
     monkeypatch.setattr("gustform_cli.figures.draw", after_the_run)
