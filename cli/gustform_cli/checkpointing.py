@@ -12,7 +12,7 @@ from gustform.language.errors import GustformError
 from gustform_cli import checkpoint as files
 from gustform_cli.assemble import Assembled
 from gustform_cli.checkpoint import Checkpoint
-from gustform_cli.journalled_file import in_use
+from gustform_cli.journalled_file import lock
 from gustform_cli.result import ResultWriter
 from gustform_cli.rows import RowBlocks
 from gustform_cli.versions import versions
@@ -131,12 +131,7 @@ class Keeper:
         places_file = files.chunks_file(self._result, generation)
         try:
             with old.open("rb") as source:
-                if in_use(source):
-                    raise GustformError(
-                        "GF7008",
-                        f"the run cannot go on from {str(old)!r}: it still runs",
-                        hint="waiting, or its Ctrl-C",
-                    )
+                lock(source, shared=True)
                 for first in range(0, found.blocks, _BATCH):
                     wanted = min(_BATCH, found.blocks - first)
                     places = files.read_places(places_file, found.variables, first, wanted)
@@ -145,6 +140,10 @@ class Keeper:
                     self._writer.adopt(source, places)
         except FileNotFoundError as error:
             raise files.damaged(self._file, f"{Path(error.filename or old).name} is missing") from None
+        except BlockingIOError:
+            raise GustformError(
+                "GF7008", f"the run cannot go on from {str(old)!r}: it still runs", hint="waiting, or its Ctrl-C"
+            ) from None
         except ValueError as error:
             raise files.damaged(old, str(error)) from None
         self._generation = generation + 1

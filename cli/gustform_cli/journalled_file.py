@@ -13,12 +13,14 @@ This is a redo log, as databases have it. `complete` does what the one that was 
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import hashlib
 import os
 import struct
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import BinaryIO
+from typing import IO
 
 _PAGE = 4096
 _DIGEST = hashlib.sha256().digest_size
@@ -33,7 +35,7 @@ class JournalledFile:
         self._stream = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT, 0o666), "r+b", buffering=0)
         self._file = self._stream.fileno()
         try:
-            _lock(self._file)
+            lock(self._stream)
             os.ftruncate(self._file, 0)
         except OSError:
             self._stream.close()
@@ -45,13 +47,9 @@ class JournalledFile:
         self._pages: dict[int, bytearray] = {}  # before it, as they will be in the next state
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
-        """Go to a place."""
-        if whence == os.SEEK_END:
-            offset += self._size
-        elif whence == os.SEEK_CUR:
-            offset += self._place
-        self._place = offset
-        return offset
+        """Go to a place, counted from the beginning or from the end."""
+        self._place = offset + (self._size if whence == os.SEEK_END else 0)
+        return self._place
 
     def tell(self) -> int:
         """The place."""
@@ -61,11 +59,9 @@ class JournalledFile:
         """As many bytes from here as the buffer takes or the file has."""
         count = max(0, min(len(buffer), self._size - self._place))
         data = bytearray(os.pread(self._file, count, self._place).ljust(count, b"\0"))
-        for number in self._numbers(self._place, count):
+        for number, in_page, in_data in _pieces(self._place, count):
             if number in self._pages:
-                at = number * _PAGE - self._place
-                begin, end = max(at, 0), min(at + _PAGE, count)
-                data[begin:end] = self._pages[number][begin - at : end - at]
+                data[in_data] = self._pages[number][in_page]
         buffer[:count] = data
         self._place += count
         return count
@@ -78,14 +74,10 @@ class JournalledFile:
     def write(self, data: memoryview) -> int:
         """Put bytes here: into pages of the last whole state, and on the disk behind them."""
         place, count = self._place, len(data)
-        inside = min(count, self._border - place)
-        for number in self._numbers(place, inside):
-            at = number * _PAGE - place
-            begin, end = max(at, 0), min(at + _PAGE, count)
-            self._page(number)[begin - at : end - at] = data[begin:end]
-        if inside < count:
-            behind = max(inside, 0)
-            _put(self._file, data[behind:], place + behind)
+        inside = max(0, min(count, self._border - place))
+        for number, in_page, in_data in _pieces(place, inside):
+            self._page(number)[in_page] = data[in_data]
+        _put(self._file, data[inside:], place + inside)
         self._place = place + count
         self._size = max(self._size, self._place)
         return count
@@ -119,11 +111,6 @@ class JournalledFile:
         """Close it as it is; what was not committed is gone."""
         self._stream.close()
 
-    @staticmethod
-    def _numbers(place: int, count: int) -> range:
-        """Of the pages that some bytes lie in."""
-        return range(place // _PAGE, -(-(place + count) // _PAGE)) if count > 0 else range(0)
-
     def _page(self, number: int) -> bytearray:
         if number not in self._pages:
             self._pages[number] = bytearray(os.pread(self._file, _PAGE, number * _PAGE).ljust(_PAGE, b"\0"))
@@ -136,52 +123,42 @@ def complete(path: Path) -> None:
     redo = _redo(path)
     if not redo.exists():
         return
-    try:
-        file = os.open(path, os.O_RDWR)
-    except OSError:
-        return
-    try:
-        _lock(file)
+    with contextlib.suppress(OSError), path.open("r+b", buffering=0) as stream:
+        lock(stream)
         data = redo.read_bytes()
         if hashlib.sha256(data[_DIGEST:]).digest() == data[:_DIGEST]:
             size, count = struct.unpack_from("<2Q", data, _DIGEST)
             numbers = struct.unpack_from(f"<{count}Q", data, _DIGEST + 16)
             pages = memoryview(data)[_DIGEST + 16 + 8 * count :]
-            _carry_out(file, size, [(n, pages[k * _PAGE : (k + 1) * _PAGE]) for k, n in enumerate(numbers)])
+            pieces = ((n, pages[k * _PAGE : (k + 1) * _PAGE]) for k, n in enumerate(numbers))
+            _carry_out(stream.fileno(), size, pieces)
         redo.unlink()
-    except OSError:
-        return
-    finally:
-        os.close(file)
 
 
-def in_use(stream: BinaryIO) -> bool:
-    """Whether another process writes to this file."""
+def lock(stream: IO[bytes], *, shared: bool = False) -> None:
+    """Until it is closed nobody else writes to this file, nor reads it unless `shared`; BlockingIOError if somebody
+    does. HDF5 locks the files that it opens in the same way. Some file systems have no locks."""
     try:
-        fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return True
-    except OSError:
-        return False  # a file system without locks
-    fcntl.flock(stream, fcntl.LOCK_UN)
-    return False
-
-
-def _redo(path: Path) -> Path:
-    return path.with_name(f"{path.name}.redo")
-
-
-def _lock(file: int) -> None:
-    """As HDF5 locks the files that it opens itself; BlockingIOError. Some file systems have no locks."""
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        fcntl.flock(stream, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
     except BlockingIOError as error:
         raise BlockingIOError(error.errno, "another process has it open") from None
     except OSError:
         pass
 
 
-def _carry_out(file: int, size: int, pages: list[tuple[int, bytearray]] | list[tuple[int, memoryview]]) -> None:
+def _redo(path: Path) -> Path:
+    return path.with_name(f"{path.name}.redo")
+
+
+def _pieces(place: int, count: int) -> Iterator[tuple[int, slice, slice]]:
+    """Of some bytes what lies in each page: its number, where it is there and where among the bytes."""
+    for number in range(place // _PAGE, -(-(place + count) // _PAGE) if count else 0):
+        at = number * _PAGE - place
+        begin, end = max(at, 0), min(at + _PAGE, count)
+        yield number, slice(begin - at, end - at), slice(begin, end)
+
+
+def _carry_out(file: int, size: int, pages: Iterable[tuple[int, bytearray | memoryview]]) -> None:
     for number, page in pages:
         _put(file, memoryview(page), number * _PAGE)
     os.ftruncate(file, size)

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from gustform_cli import journalled_file
-from gustform_cli.journalled_file import JournalledFile, complete
+from gustform_cli.journalled_file import JournalledFile, complete, lock
 
 
 def put(file: JournalledFile, place: int, data: bytes) -> None:
@@ -129,6 +129,18 @@ def test_a_file_in_use_is_left_alone(tmp_path: Path) -> None:
     file.close()
     JournalledFile(path).close()
     assert list(tmp_path.iterdir()) == [tmp_path / "file"]
+
+
+def test_readers_do_not_keep_readers_out(tmp_path: Path) -> None:
+    """A result that is open in a notebook can be gone on with; one that is being written cannot."""
+    path = tmp_path / "file.h5"
+    h5py.File(path, "w").close()
+    with h5py.File(path, "r"), path.open("rb") as stream:
+        lock(stream, shared=True)
+    file = JournalledFile(path)
+    with path.open("rb") as stream, pytest.raises(BlockingIOError):
+        lock(stream, shared=True)
+    file.close()
 
 
 WRITER = """
