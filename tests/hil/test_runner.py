@@ -14,6 +14,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.waiting import wait_for
+
 ROOT = Path(__file__).resolve().parents[2]
 RUNNER = ROOT / "hil" / "vcan" / "with-vcan"
 TIMEOUT = 90
@@ -145,9 +147,7 @@ def test_a_signal_reaches_the_command_which_ends_in_its_own_way(number: signal.S
 def test_a_signal_during_the_boot_ends_the_guest(part: float, place: Path) -> None:
     """At some moments user-mode Linux leaves a stopped process behind when it is told to end."""
     with subprocess.Popen(arguments("sleep", "1000")) as process:
-        deadline = time.monotonic() + TIMEOUT
-        while len(guests(place)) < 2 and time.monotonic() < deadline:
-            time.sleep(0.01)
+        wait_for(lambda: len(guests(place)) >= 2, TIMEOUT)  # its folder and its first process
         time.sleep(part)
         process.terminate()
         assert process.wait(TIMEOUT) == 128 + signal.SIGTERM
@@ -159,10 +159,7 @@ def test_a_killed_runner_leaves_no_guest_behind(place: Path) -> None:
         assert process.stdout is not None
         assert process.stdout.readline() == b"waiting\n"
         process.kill()
-    deadline = time.monotonic() + TIMEOUT
-    while len(guests(place)) > 1 and time.monotonic() < deadline:
-        time.sleep(0.05)
-    assert len(guests(place)) == 1  # its folder: nobody was left to remove it
+    wait_for(lambda: len(guests(place)) == 1, TIMEOUT)  # its folder: nobody was left to remove it
 
 
 def test_a_killed_guest_takes_its_processes_along_and_is_said(place: Path) -> None:

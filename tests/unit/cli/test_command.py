@@ -7,7 +7,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,7 @@ from typer.testing import CliRunner, Result
 
 from gustform_cli.main import app
 from gustform_cli.new import SCENARIOS
+from tests.support.waiting import wait_for
 
 LOAD_STEP = SCENARIOS / "load_step_8ms.yaml"
 TURBULENT = SCENARIOS / "turbulent_10min.yaml"
@@ -159,12 +159,13 @@ def start_long_run(out: Path) -> subprocess.Popen[str]:
          "run.until=1000 h", "--set", "output.every=1 s"],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment(),
     )  # fmt: skip
-    deadline = time.monotonic() + 60.0
     part = out / "result.nc.part"
-    while not (part.exists() and part.stat().st_size > 600_000):  # two blocks of 17 x 4096 values, and more
+
+    def has_rows() -> bool:
         assert process.poll() is None, process.communicate()
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
+        return part.exists() and part.stat().st_size > 600_000  # two blocks of 17 x 4096 values, and more
+
+    wait_for(has_rows, 60.0)
     return process
 
 

@@ -9,7 +9,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -40,6 +39,7 @@ from gustform_cli.study.tradeoff_results import (
 from gustform_cli.study.tradeoff_wind import UNITS, Rows, compare, measure
 from gustform_cli.sweep.case import Fault, Task
 from gustform_cli.sweep.store import Record
+from tests.support.waiting import wait_for
 
 
 def gustform(*arguments: object) -> Result:
@@ -316,10 +316,7 @@ def test_an_interrupted_study_goes_on(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "gustform_cli", "study", "tradeoff", "--out", str(tmp_path), *map(str, SMALL)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     journal = tmp_path / "wind" / "journal.jsonl"
-    for _ in range(600):
-        if (journal.exists() and b'"scalars"' in journal.read_bytes()) or process.poll() is not None:
-            break
-        time.sleep(0.1)
+    wait_for(lambda: process.poll() is not None or (journal.exists() and b'"scalars"' in journal.read_bytes()), 60.0)
     os.kill(process.pid, signal.SIGINT)
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 130, errors

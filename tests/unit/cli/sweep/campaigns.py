@@ -14,6 +14,8 @@ from typer.testing import CliRunner, Result
 
 from gustform_cli.main import app
 from gustform_cli.new import SCENARIOS
+from gustform_cli.sweep.store import JOURNAL
+from tests.support.waiting import wait_for
 
 BASE = SCENARIOS / "turbulent_10min.yaml"
 # 5 s, with few rows and channels: what a run costs besides is the same.
@@ -46,6 +48,18 @@ def start(file: Path, out: Path, *more: object) -> subprocess.Popen[str]:
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
     command = [sys.executable, "-m", "gustform_cli", *arguments(file, out, *more)]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
+
+
+def wait_for_cases(process: subprocess.Popen[str], out: Path, more_than: int, seconds: float = 60.0) -> None:
+    """Until more cases than that have ended; the sweep has not come to its end before."""
+
+    def have_ended() -> bool:
+        if (out / JOURNAL).is_file() and (out / JOURNAL).read_bytes().count(b"\n") > more_than:
+            return True
+        assert process.poll() is None, process.communicate()
+        return False
+
+    wait_for(have_ended, seconds)
 
 
 def rows(out: Path) -> list[dict[str, Any]]:

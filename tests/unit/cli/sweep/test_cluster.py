@@ -6,7 +6,6 @@ import json
 import os
 import signal
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -14,8 +13,7 @@ from typing import Any
 import psutil
 import pytest
 
-from gustform_cli.sweep.store import JOURNAL
-from tests.unit.cli.sweep.campaigns import CURTAILMENTS, SHORT, numbers, rows, start, sweep, write
+from tests.unit.cli.sweep.campaigns import CURTAILMENTS, SHORT, numbers, rows, start, sweep, wait_for_cases, write
 
 pytestmark = pytest.mark.xdist_group("cluster")  # one cluster at a time
 
@@ -74,11 +72,7 @@ def test_a_killed_worker_loses_no_run(cluster: Any, tmp_path: Path) -> None:
     body = f"axes: [{{type: grid, values: {{wind.wt.seed: [{values}]}}}}]\nkeep: all\n"
     file, out = write(tmp_path, body, SHORT.replace("5 s", "20 min")), tmp_path / "out"
     process = start(file, out, "--scheduler", cluster.scheduler_address, "--json")
-    deadline = time.monotonic() + 120.0
-    while not ((out / JOURNAL).is_file() and (out / JOURNAL).read_bytes().count(b"\n") > 3):
-        assert process.poll() is None, process.communicate()
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
+    wait_for_cases(process, out, 3, 120.0)
     victim = workers(cluster)[0]
     psutil.Process(victim).send_signal(signal.SIGKILL)
     stdout, stderr = process.communicate(timeout=200)

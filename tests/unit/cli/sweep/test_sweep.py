@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 import os
 import signal
-import subprocess
-import time
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +13,18 @@ import pytest
 import xarray
 
 from gustform_cli.sweep.store import JOURNAL
-from tests.unit.cli.sweep.campaigns import BASE, CURTAILMENTS, SHORT, about, numbers, rows, start, sweep, write
+from tests.unit.cli.sweep.campaigns import (
+    BASE,
+    CURTAILMENTS,
+    SHORT,
+    about,
+    numbers,
+    rows,
+    start,
+    sweep,
+    wait_for_cases,
+    write,
+)
 
 FAILING = """
 axes:
@@ -183,15 +192,6 @@ def test_a_warning_is_said_once_and_before(tmp_path: Path) -> None:
     assert result.exit_code == 0, result.output
     assert result.stderr.count("warning: ") == 1
     assert "repeat" in result.stderr
-
-
-def wait_for_cases(process: subprocess.Popen[str], out: Path, more_than: int) -> None:
-    """Until more cases than that have ended; the sweep still runs then."""
-    deadline = time.monotonic() + 60.0
-    while not ((out / JOURNAL).is_file() and (out / JOURNAL).read_bytes().count(b"\n") > more_than):
-        assert process.poll() is None, process.communicate()
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
 
 
 def test_ctrl_c_keeps_what_has_ended(tmp_path: Path) -> None:
